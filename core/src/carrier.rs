@@ -1,0 +1,53 @@
+//! The carrier: keyed chips that spread the message over the coefficients (paper, section 3.4).
+
+use crate::key::SecretKey;
+use rand_chacha::{ChaCha20Rng, rand_core::{Rng, SeedableRng}};
+
+/// Chips p_i = ±1, one sequence for each patch and axis: equal carriers could be averaged out of a map.
+pub struct Carrier {
+    seed: [u8; 32],
+}
+
+impl Carrier {
+    /// The carrier of a key.
+    pub fn new(key: &SecretKey) -> Self {
+        Carrier { seed: key.chip_seed() }
+    }
+
+    /// `count` chips of a patch and axis (0 = x, 1 = y): bits of ChaCha20 stream 2·patch + axis,
+    /// least significant bit of each 64-bit word first.
+    pub fn chips(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        let mut stream = ChaCha20Rng::from_seed(self.seed);
+        stream.set_stream((2 * patch + axis) as u64);
+        let mut word = 0;
+        let chip = |i: usize| {
+            if i.is_multiple_of(64) {
+                word = stream.next_u64();
+            }
+            if word >> (i % 64) & 1 == 1 { 1.0 } else { -1.0 }
+        };
+        (0..count).map(chip).collect()
+    }
+}
+
+/// The message bit that coefficient `i` (1 … m·c) carries; coefficient 0 is the mean and carries none.
+pub fn bit_of_coefficient(i: usize, chip_rate: usize) -> usize {
+    (i - 1) / chip_rate
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chips_are_reproducible_balanced_and_different_for_every_patch_and_axis() {
+        let carrier = Carrier::new(&SecretKey::from_bytes([3; 32]));
+        let chips = carrier.chips(5, 1, 10_000);
+        assert_eq!(chips[..100], carrier.chips(5, 1, 100));
+        assert!(chips.iter().sum::<f64>().abs() < 500.0); // 5 standard deviations
+        for other in [carrier.chips(5, 0, 10_000), carrier.chips(6, 1, 10_000)] {
+            let product: f64 = chips.iter().zip(&other).map(|(a, b)| a * b).sum();
+            assert!(product.abs() < 500.0);
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The secret key k_w and what is derived from it.
+
+use crate::{Error, Result, message::Message, message::to_hex};
+use hmac::{Hmac, KeyInit, Mac};
+use serde::{Deserialize, Serialize};
+use sha2::Sha256;
+use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
+
+const VERSION: u32 = 1;
+
+/// A 256-bit secret. It never prints itself and is wiped from memory when dropped.
+#[derive(Clone, Zeroize, ZeroizeOnDrop)]
+pub struct SecretKey([u8; 32]);
+
+/// The key file (JSON).
+#[derive(Serialize, Deserialize, ZeroizeOnDrop)]
+#[serde(deny_unknown_fields)]
+struct KeyFile {
+    #[zeroize(skip)]
+    meshmark_key: u32,
+    #[zeroize(skip)]
+    id: String,
+    secret: String,
+}
+
+impl SecretKey {
+    /// The key with these 32 secret bytes; take them from the operating system's generator.
+    pub fn from_bytes(secret: [u8; 32]) -> Self {
+        SecretKey(secret)
+    }
+
+    /// Reads a key file's text.
+    ///
+    /// # Errors
+    /// [`Error::Key`] when it is not a key file of this version or its id is not that of its
+    /// secret. The message never holds the secret.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let malformed = |reason: &str| Error::Key(reason.to_string());
+        // serde's own messages may quote values of the file, so they are not passed on.
+        let file: KeyFile = serde_json::from_str(text).map_err(|_| {
+            malformed("it is not JSON with exactly the fields meshmark_key, id and secret")
+        })?;
+        if file.meshmark_key != VERSION {
+            return Err(malformed(&format!("version {} instead of {VERSION}", file.meshmark_key)));
+        }
+        let digits = file.secret.as_bytes();
+        let hex = |i: usize| digits.get(i).and_then(|d| (*d as char).to_digit(16));
+        let byte = |i: usize| Some((hex(2 * i)? << 4 | hex(2 * i + 1)?) as u8);
+        let mut secret = Zeroizing::new([0; 32]);
+        for (i, out) in secret.iter_mut().enumerate() {
+            *out = byte(i).ok_or_else(|| malformed("the secret is not 64 hexadecimal digits"))?;
+        }
+        if digits.len() != 64 {
+            return Err(malformed("the secret is not 64 hexadecimal digits"));
+        }
+        let key = SecretKey(*secret);
+        if key.id() != file.id {
+            return Err(malformed("the id is not that of the secret, so one of them was changed"));
+        }
+        Ok(key)
+    }
+
+    /// The text of a key file.
+    pub fn to_json(&self) -> Zeroizing<String> {
+        let file = KeyFile { meshmark_key: VERSION, id: self.id(), secret: to_hex(&self.0) };
+        Zeroizing::new(serde_json::to_string_pretty(&file).expect("strings are JSON") + "\n")
+    }
+
+    /// The public name of the key: 64 bits of a keyed hash, in hexadecimal.
+    pub fn id(&self) -> String {
+        to_hex(&self.derive("key id", b"")[..8])
+    }
+
+    /// The message of a recipient: 128 bits of a keyed hash of the text.
+    pub fn recipient_message(&self, recipient: &str) -> Message {
+        Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..16])
+    }
+
+    /// The seed of the chip streams.
+    pub(crate) fn chip_seed(&self) -> [u8; 32] {
+        self.derive("chips", b"")
+    }
+
+    /// HMAC-SHA-256 (FIPS 198-1) of a purpose and a text, so that no use of the key tells of another.
+    fn derive(&self, purpose: &str, text: &[u8]) -> [u8; 32] {
+        let mut mac = Hmac::<Sha256>::new_from_slice(&self.0).expect("HMAC takes any key length");
+        mac.update(b"meshmark v1 ");
+        mac.update(purpose.as_bytes());
+        mac.update(&[0]);
+        mac.update(text);
+        mac.finalize().into_bytes().into()
+    }
+}
+
+impl std::fmt::Debug for SecretKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "SecretKey(id {})", self.id())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_file_reads_back_and_debug_hides_the_secret() {
+        let key = SecretKey::from_bytes([0xab; 32]);
+        let read = SecretKey::from_json(&key.to_json()).unwrap();
+        assert_eq!(read.0, key.0);
+        assert!(!format!("{read:?}").contains("abab"));
+    }
+
+    #[test]
+    fn a_changed_key_file_is_refused_without_quoting_it() {
+        let text = SecretKey::from_bytes([0xab; 32]).to_json().to_string();
+        for bad in [
+            text.replace("ababab", "ababac"),
+            text.replace("\"abab", "\"ab"),
+            text.replace("\"meshmark_key\": 1", "\"meshmark_key\": 2"),
+            text.replace("secret", "password"),
+            String::from("{}"),
+            String::new(),
+        ] {
+            let error = SecretKey::from_json(&bad).unwrap_err().to_string();
+            assert!(error.contains("malformed key") && !error.contains("abab"), "{error}");
+        }
+    }
+
+    #[test]
+    fn recipients_and_keys_have_messages_of_their_own() {
+        let (a, b) = (SecretKey::from_bytes([1; 32]), SecretKey::from_bytes([2; 32]));
+        assert_eq!(a.recipient_message("ACME").len(), 128);
+        assert_ne!(a.recipient_message("ACME"), a.recipient_message("ACME "));
+        assert_ne!(a.recipient_message("ACME"), b.recipient_message("ACME"));
+        assert_ne!(a.id(), b.id());
+    }
+}

@@ -1,0 +1,119 @@
+//! The Delaunay mesh that joins all vertices of a map (paper, section 3.1).
+
+use crate::{Error, Result};
+use robust::{Coord, orient2d};
+use spade::{DelaunayTriangulation, Point2, Triangulation};
+use std::collections::HashMap;
+
+/// The edges of a Delaunay triangulation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh {
+    edges: Vec<[u32; 2]>,
+}
+
+impl Mesh {
+    /// Triangulates `points` (distinct, relative to a local origin).
+    ///
+    /// # Errors
+    /// [`Error::Collinear`] when no triangle exists.
+    ///
+    /// # Panics
+    /// When a coordinate is not finite or there are 2³² points; [`crate::vertices::VertexTable`]
+    /// lets neither through.
+    pub fn delaunay(points: &[[f64; 2]]) -> Result<Self> {
+        if all_collinear(points) {
+            return Err(Error::Collinear { vertices: points.len() });
+        }
+        let elements = points.iter().map(|&[x, y]| Point2::new(drop_tiny(x), drop_tiny(y)));
+        let triangulation: DelaunayTriangulation<Point2<f64>> =
+            DelaunayTriangulation::bulk_load_stable(elements.collect())
+                .expect("coordinates are finite, not tiny and below 1e30");
+        let number = Numbering::new(points, &triangulation);
+        let mut edges: Vec<[u32; 2]> = triangulation
+            .undirected_edges()
+            .map(|edge| {
+                let [a, b] = edge.vertices().map(|v| number.of(v.fix().index(), v.position()));
+                [a.min(b), a.max(b)]
+            })
+            .collect();
+        edges.sort_unstable();
+        Ok(Mesh { edges })
+    }
+
+    /// Edges as pairs of vertex indices `[i, j]`, i < j, sorted.
+    pub fn edges(&self) -> &[[u32; 2]] {
+        &self.edges
+    }
+}
+
+/// spade refuses magnitudes under 1e-142; relative to the extent of any map they are zero.
+fn drop_tiny(value: f64) -> f64 {
+    if value.abs() < 1e-140 { 0.0 } else { value }
+}
+
+/// From the triangulation's vertices to our numbers. They are the same unless two distinct vertices
+/// became one when the local origin was subtracted; then the mesh holds the first of them, and the
+/// other one is joined to its patch by the bridging rule of [`crate::patches`].
+enum Numbering {
+    Same,
+    ByPosition(HashMap<[u64; 2], u32>),
+}
+
+impl Numbering {
+    fn new(points: &[[f64; 2]], triangulation: &DelaunayTriangulation<Point2<f64>>) -> Self {
+        if triangulation.num_vertices() == points.len() {
+            return Numbering::Same;
+        }
+        let mut first = HashMap::new();
+        for (i, &[x, y]) in points.iter().enumerate() {
+            first.entry(bits(drop_tiny(x), drop_tiny(y))).or_insert(i as u32);
+        }
+        Numbering::ByPosition(first)
+    }
+
+    fn of(&self, index: usize, position: Point2<f64>) -> u32 {
+        match self {
+            Numbering::Same => index as u32,
+            Numbering::ByPosition(first) => first[&bits(position.x, position.y)],
+        }
+    }
+}
+
+fn bits(x: f64, y: f64) -> [u64; 2] {
+    [(x + 0.0).to_bits(), (y + 0.0).to_bits()]
+}
+
+/// Whether no three points span a triangle, by an exact predicate. The first and the last point
+/// in canonical order are the ends of the line, if there is one.
+fn all_collinear(points: &[[f64; 2]]) -> bool {
+    let coord = |p: &[f64; 2]| Coord { x: p[0], y: p[1] };
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return true };
+    points.iter().all(|p| orient2d(coord(first), coord(last), coord(p)) == 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_with_its_centre_has_eight_edges() {
+        let points = [[0.0, 0.0], [0.0, 2.0], [1.0, 1.0], [2.0, 0.0], [2.0, 2.0]];
+        assert_eq!(
+            Mesh::delaunay(&points).unwrap().edges(),
+            [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]]
+        );
+    }
+
+    #[test]
+    fn a_straight_line_is_refused() {
+        let line: Vec<_> = (0..20_000).map(|i| [i as f64, 2.0 * i as f64]).collect();
+        assert_eq!(Mesh::delaunay(&line), Err(Error::Collinear { vertices: 20_000 }));
+        assert_eq!(Mesh::delaunay(&[[1.0, 1.0]]), Err(Error::Collinear { vertices: 1 }));
+    }
+
+    #[test]
+    fn vertices_that_collapse_on_the_local_origin_keep_their_numbers() {
+        let points = [[0.0, 0.0], [0.0, 0.0], [0.0, 2.0], [2.0, 0.0]];
+        assert_eq!(Mesh::delaunay(&points).unwrap().edges(), [[0, 2], [0, 3], [2, 3]]);
+    }
+}

@@ -1,0 +1,293 @@
+//! The watermark options: one table that makes the driver's option list, the parser, the flags of
+//! the command line and the table in the docs.
+
+use crate::{Error, Result, key::SecretKey, message::Message};
+
+/// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
+/// need minutes and gigabytes a solve.
+pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
+
+/// What an option's value must be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Any text that is not empty.
+    Text,
+    /// A number, greater than the first bound, at most the second.
+    Number(f64, f64),
+    /// A whole number between two bounds, both legal.
+    Integer(usize, usize),
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct OptionSpec {
+    /// Its name in the driver, upper case; `--lower-case` on the command line.
+    pub name: &'static str,
+    /// What its value must be.
+    pub kind: Kind,
+    /// Its value when it is not given.
+    pub default: Option<&'static str>,
+    /// One sentence for the docs and for the driver's option list.
+    pub help: &'static str,
+    /// Whether it shapes the mark, so that `meshmark verify` needs it when there is no record.
+    pub shapes_mark: bool,
+}
+
+const fn row(
+    name: &'static str,
+    kind: Kind,
+    default: Option<&'static str>,
+    shapes_mark: bool,
+    help: &'static str,
+) -> OptionSpec {
+    OptionSpec { name, kind, default, help, shapes_mark }
+}
+
+/// All options, in the order of the docs.
+pub const OPTIONS: &[OptionSpec] = &[
+    row("KEY", Kind::Text, None, false, "Key file made by `meshmark keygen`; or configuration option MESHMARK_KEY"),
+    row("RECIPIENT", Kind::Text, None, true, "Who receives this copy; the message is 128 bits of a keyed hash of this text"),
+    row("MESSAGE", Kind::Text, None, true, "The message itself, 2 to 256 hexadecimal digits, instead of RECIPIENT"),
+    row("AMPLITUDE", Kind::Number(0.0, 1e6), Some("0.10"), true, "Amplitude of every coefficient, metres on the ground"),
+    row("CHIP_RATE", Kind::Integer(1, 2048), Some("2"), true, "Coefficients that carry each message bit, per patch and axis"),
+    row("PATCH_SIZE", Kind::Integer(PATCH_SIZE_RANGE.0, PATCH_SIZE_RANGE.1), Some("480"), true, "Smallest number of vertices in a patch"),
+    row("TOLERANCE", Kind::Number(0.0, 1e6), Some("0.75"), true, "No vertex moves further than this, metres on the ground"),
+    row("PRECISION", Kind::Number(0.0, 1e6), None, true, "Grid of the marked coordinates, CRS units; none by default"),
+    row("LAYERS", Kind::Text, None, true, "Comma-separated layers to mark together; the others pass unchanged; all by default"),
+    row("SRS", Kind::Text, None, true, "CRS of the source when it has none, for example EPSG:3067"),
+    row("RECORD", Kind::Text, None, false, "Record file to write: what an auditor needs besides the key and the reference"),
+];
+
+/// Looks a row up by its name, in any case.
+pub fn spec(name: &str) -> Option<&'static OptionSpec> {
+    OPTIONS.iter().find(|o| o.name.eq_ignore_ascii_case(name))
+}
+
+/// The numbers that shape a mark; with the key, the message and the reference they determine it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameters {
+    /// α, amplitude per coefficient, metres on the ground.
+    pub amplitude_m: f64,
+    /// c, coefficients per message bit, patch and axis.
+    pub chip_rate: usize,
+    /// d, the smallest number of vertices in a patch.
+    pub patch_size: usize,
+    /// No vertex moves further, metres on the ground.
+    pub tolerance_m: f64,
+    /// Grid of the marked coordinates, CRS units.
+    pub precision: Option<f64>,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Options::parse([("MESSAGE", "00")]).expect("the defaults are legal").parameters
+    }
+}
+
+/// What the mark says: a name, or the bits themselves.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Subject {
+    /// The message is a keyed hash of this text.
+    Recipient(String),
+    /// The message.
+    Message(Message),
+}
+
+impl Subject {
+    /// The message under a key.
+    pub fn message(&self, key: &SecretKey) -> Message {
+        match self {
+            Subject::Recipient(text) => key.recipient_message(text),
+            Subject::Message(message) => message.clone(),
+        }
+    }
+}
+
+/// All options of one marking, parsed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Path of the key file.
+    pub key_path: Option<String>,
+    /// Exactly one of RECIPIENT and MESSAGE, or none (an auditor may not know it).
+    pub subject: Option<Subject>,
+    /// The numbers.
+    pub parameters: Parameters,
+    /// Layers to mark; all when `None`.
+    pub layers: Option<Vec<String>>,
+    /// CRS of the source when it has none.
+    pub srs: Option<String>,
+    /// Path of the record to write.
+    pub record_path: Option<String>,
+}
+
+impl Options {
+    /// Parses name-value pairs; names in any case.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for an unknown name, a name given twice, a value that is not what its row
+    /// says, or both RECIPIENT and MESSAGE; [`Error::Message`] for bad hexadecimal digits.
+    pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
+        let values = Values::collect(pairs)?;
+        let precision = values.number("PRECISION")?;
+        Ok(Options {
+            key_path: values.text("KEY")?,
+            subject: values.subject()?,
+            parameters: Parameters {
+                amplitude_m: values.number("AMPLITUDE")?.expect("has a default"),
+                chip_rate: values.integer("CHIP_RATE")?,
+                patch_size: values.integer("PATCH_SIZE")?,
+                tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
+                precision,
+            },
+            layers: values.list("LAYERS")?,
+            srs: values.text("SRS")?,
+            record_path: values.text("RECORD")?,
+        })
+    }
+}
+
+/// The given pairs, each name known and given once.
+struct Values<'a>(Vec<(&'static OptionSpec, &'a str)>);
+
+impl<'a> Values<'a> {
+    fn collect(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
+        let mut values: Vec<(&OptionSpec, &str)> = Vec::new();
+        for (name, value) in pairs {
+            let Some(spec) = spec(name) else {
+                let known: Vec<_> = OPTIONS.iter().map(|o| o.name).collect();
+                return Err(Error::Option(format!("unknown option {name}: use {}", known.join(", "))));
+            };
+            if values.iter().any(|(s, _)| s.name == spec.name) {
+                return Err(Error::Option(format!("{} is given twice: give it once", spec.name)));
+            }
+            values.push((spec, value));
+        }
+        Ok(Values(values))
+    }
+
+    fn given(&self, name: &str) -> Option<&'a str> {
+        self.0.iter().find(|(spec, _)| spec.name == name).map(|(_, value)| *value)
+    }
+
+    fn text(&self, name: &str) -> Result<Option<String>> {
+        match self.given(name) {
+            Some(value) if value.trim().is_empty() => {
+                Err(Error::Option(format!("{name} is empty: give it a value or leave it out")))
+            }
+            value => Ok(value.map(String::from)),
+        }
+    }
+
+    fn subject(&self) -> Result<Option<Subject>> {
+        match (self.text("RECIPIENT")?, self.text("MESSAGE")?) {
+            (Some(_), Some(_)) => {
+                Err(Error::Option("both RECIPIENT and MESSAGE are given: give exactly one".into()))
+            }
+            (Some(text), None) => Ok(Some(Subject::Recipient(text))),
+            (None, Some(hex)) => Ok(Some(Subject::Message(Message::from_hex(&hex)?))),
+            (None, None) => Ok(None),
+        }
+    }
+
+    fn list(&self, name: &str) -> Result<Option<Vec<String>>> {
+        let Some(text) = self.text(name)? else { return Ok(None) };
+        let names: Vec<String> = text.split(',').map(|n| n.trim().to_string()).collect();
+        if names.iter().any(String::is_empty) {
+            return Err(Error::Option(format!("{name}={text} has an empty name between its commas")));
+        }
+        Ok(Some(names))
+    }
+
+    fn number(&self, name: &str) -> Result<Option<f64>> {
+        let spec = spec(name).expect("a row of the table");
+        let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
+        let Kind::Number(above, most) = spec.kind else { unreachable!("{name} is a number") };
+        match value.trim().parse::<f64>() {
+            Ok(number) if number > above && number <= most => Ok(Some(number)),
+            _ => Err(Error::Option(format!(
+                "{name}={value} is not a number greater than {above} and at most {most}"
+            ))),
+        }
+    }
+
+    fn integer(&self, name: &str) -> Result<usize> {
+        let spec = spec(name).expect("a row of the table");
+        let Kind::Integer(least, most) = spec.kind else { unreachable!("{name} is an integer") };
+        let value = self.given(name).or(spec.default).expect("has a default");
+        match value.trim().parse::<usize>() {
+            Ok(number) if (least..=most).contains(&number) => Ok(number),
+            _ => Err(Error::Option(format!(
+                "{name}={value} is not a whole number from {least} to {most}"
+            ))),
+        }
+    }
+}
+
+/// The XML option list a GDAL driver declares (DMD_OPENOPTIONLIST).
+pub fn option_list_xml() -> String {
+    let rows: String = OPTIONS.iter().map(option_xml).collect();
+    format!("<OpenOptionList>{rows}</OpenOptionList>")
+}
+
+fn option_xml(option: &OptionSpec) -> String {
+    let (kind, range) = match option.kind {
+        Kind::Text => ("string", String::new()),
+        Kind::Number(above, most) => ("float", format!(" min='{above}' max='{most}'")),
+        Kind::Integer(least, most) => ("int", format!(" min='{least}' max='{most}'")),
+    };
+    let default = option.default.map_or(String::new(), |d| format!(" default='{d}'"));
+    format!(
+        "<Option name='{}' type='{kind}'{range}{default} description='{}'/>",
+        option.name, option.help
+    )
+}
+
+/// The options as a Markdown table, for the docs.
+pub fn option_table_markdown() -> String {
+    let row = |o: &OptionSpec| {
+        format!("| `{}` | {} | {} |\n", o.name, o.default.map_or("".into(), |d| format!("`{d}`")), o.help)
+    };
+    let rows: String = OPTIONS.iter().map(row).collect();
+    format!("| option | default | meaning |\n|---|---|---|\n{rows}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(pairs: &[(&str, &str)]) -> String {
+        Options::parse(pairs.iter().copied()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_table() {
+        let p = Parameters::default();
+        assert_eq!((p.amplitude_m, p.chip_rate, p.patch_size), (0.10, 2, 480));
+        assert_eq!((p.tolerance_m, p.precision), (0.75, None));
+    }
+
+    #[test]
+    fn bad_values_name_the_option_and_what_is_legal() {
+        assert!(error(&[("AMPLITUDE", "wide")]).contains("AMPLITUDE=wide is not a number"));
+        assert!(error(&[("AMPLITUDE", "0")]).contains("greater than 0"));
+        assert!(error(&[("AMPLITUDE", "NaN")]).contains("greater than 0"));
+        assert!(error(&[("TOLERANCE", "inf")]).contains("at most 1000000"));
+        assert!(error(&[("CHIP_RATE", "2.5")]).contains("whole number from 1"));
+        assert!(error(&[("PATCH_SIZE", "3")]).contains("from 16 to 4096"));
+        assert!(error(&[("COLOUR", "red")]).contains("unknown option COLOUR: use KEY, "));
+        assert!(error(&[("KEY", "a"), ("key", "b")]).contains("given twice"));
+        assert!(error(&[("RECIPIENT", " ")]).contains("RECIPIENT is empty"));
+        assert!(error(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).contains("exactly one"));
+        assert!(error(&[("MESSAGE", "xyz")]).contains("hexadecimal"));
+        assert!(error(&[("LAYERS", "a,,b")]).contains("empty name"));
+    }
+
+    #[test]
+    fn the_xml_list_declares_every_option() {
+        let xml = option_list_xml();
+        for option in OPTIONS {
+            assert!(xml.contains(&format!("name='{}'", option.name)));
+            assert!(!option.help.contains(['\'', '<', '&']), "{} would break the XML", option.name);
+        }
+    }
+}

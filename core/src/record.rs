@@ -1,0 +1,138 @@
+//! The record of a marking: what an auditor needs besides the key and the reference.
+
+use crate::{
+    Error, Result,
+    embedding::Displacement,
+    message::Message,
+    options::{Parameters, Subject},
+};
+use serde::{Deserialize, Serialize};
+
+/// The version this program writes and reads.
+pub const VERSION: u32 = 1;
+
+/// A record. Field names are the option names in lower case, with their unit; it never holds the
+/// secret and no time, so that equal input makes an equal record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// Version of this format.
+    pub meshmark_record: u32,
+    /// Version of the program that marked.
+    pub software: String,
+    /// Public id of the key.
+    pub key_id: String,
+    /// The recipient, when the message was made from one.
+    pub recipient: Option<String>,
+    /// The message, hexadecimal.
+    pub message: String,
+    /// α.
+    pub amplitude_m: f64,
+    /// c.
+    pub chip_rate: usize,
+    /// d.
+    pub patch_size: usize,
+    /// No vertex moved further.
+    pub tolerance_m: f64,
+    /// Output grid in CRS units.
+    pub precision_crs_units: Option<f64>,
+    /// Layers that were marked; all when null.
+    pub layers: Option<Vec<String>>,
+    /// CRS given for a source that had none.
+    pub srs: Option<String>,
+    /// The reference map.
+    pub reference: Reference,
+    /// How far its vertices moved.
+    pub displacement: DisplacementEntry,
+}
+
+/// What a record says about the reference map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Distinct vertices of the marked layers.
+    pub vertices: usize,
+    /// Patches they were cut into.
+    pub patches: usize,
+    /// Digest of the vertices, see [`crate::vertices::VertexTable::digest`].
+    pub vertices_sha256: String,
+    /// CRS as authority and code, or as WKT; null when unknown.
+    pub crs: Option<String>,
+}
+
+/// [`Displacement`] as JSON.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DisplacementEntry {
+    /// Root mean square.
+    pub rms_m: f64,
+    /// 99th percentile.
+    pub p99_m: f64,
+    /// The largest.
+    pub max_m: f64,
+}
+
+impl From<Displacement> for DisplacementEntry {
+    fn from(d: Displacement) -> Self {
+        DisplacementEntry { rms_m: d.rms_m, p99_m: d.p99_m, max_m: d.max_m }
+    }
+}
+
+impl Record {
+    /// Reads a record's text and checks that its values are legal.
+    ///
+    /// # Errors
+    /// [`Error::Record`] says what is wrong with it.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let record: Record =
+            serde_json::from_str(text).map_err(|error| Error::Record(error.to_string()))?;
+        if record.meshmark_record != VERSION {
+            let found = record.meshmark_record;
+            return Err(Error::Record(format!("version {found} instead of {VERSION}")));
+        }
+        record.parameters()?;
+        record.message()?;
+        Ok(record)
+    }
+
+    /// The text of the record.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("a record is JSON") + "\n"
+    }
+
+    /// The numbers that shaped the mark.
+    ///
+    /// # Errors
+    /// [`Error::Record`] when one of them is out of range.
+    pub fn parameters(&self) -> Result<Parameters> {
+        let numbers = [
+            ("AMPLITUDE", self.amplitude_m.to_string()),
+            ("CHIP_RATE", self.chip_rate.to_string()),
+            ("PATCH_SIZE", self.patch_size.to_string()),
+            ("TOLERANCE", self.tolerance_m.to_string()),
+        ];
+        let precision = self.precision_crs_units.map(|p| ("PRECISION", p.to_string()));
+        let pairs = numbers.iter().chain(&precision).map(|(name, value)| (*name, value.as_str()));
+        let options = crate::options::Options::parse(pairs).map_err(|e| Error::Record(e.to_string()))?;
+        Ok(options.parameters)
+    }
+
+    /// The message that was embedded.
+    ///
+    /// # Errors
+    /// [`Error::Record`] when it is not hexadecimal.
+    pub fn message(&self) -> Result<Message> {
+        Message::from_hex(&self.message).map_err(|e| Error::Record(e.to_string()))
+    }
+
+    /// What the mark says.
+    ///
+    /// # Errors
+    /// As [`Record::message`].
+    pub fn subject(&self) -> Result<Subject> {
+        match &self.recipient {
+            Some(text) => Ok(Subject::Recipient(text.clone())),
+            None => Ok(Subject::Message(self.message()?)),
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! The mesh spectrum of a patch: eigenvectors of its Laplacian, low frequencies first
+//! (paper, section 3.3).
+
+use crate::{Error, Result, patches::Patch};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::evd::{self, SelfAdjointEvdParams, tridiag};
+use faer::linalg::{householder, qr};
+use faer::{Auto, Conj, Mat, MatRef, Par};
+use rand_chacha::{ChaCha20Rng, rand_core::{Rng, SeedableRng}};
+
+/// Eigenvalues closer than this are one subspace: its basis is chosen by [`canonical_rotation`], not
+/// by the solver.
+const EQUAL_EIGENVALUES: f64 = 1e-8;
+
+/// The first eigenvectors of the Biggs Laplacian R = I − D⁻¹A of a patch.
+///
+/// R is not symmetric. With L = I − D^−½ A D^−½ = U Λ Uᵀ, its eigenvectors are w_i = D^−½ u_i and
+/// the basis is e_i = w_i / |w_i|. E is not orthogonal; analysis uses its dual, whose row i is
+/// |w_i| u_iᵀ D^½ = |w_i|² e_iᵀ D.
+#[derive(Debug, Clone)]
+pub struct Basis {
+    /// n × k, column i = e_i, |e_i| = 1; column 0 is the constant one (eigenvalue 0).
+    pub vectors: Mat<f64>,
+    /// k eigenvalues, ascending, in [0, 2].
+    pub eigenvalues: Vec<f64>,
+    /// n vertex degrees, the diagonal of D.
+    pub degrees: Vec<f64>,
+    /// k values |w_i|².
+    pub norms_squared: Vec<f64>,
+}
+
+impl Basis {
+    /// Solves for the `count` lowest frequencies of a connected patch, the mean included.
+    ///
+    /// # Errors
+    /// [`Error::NoConvergence`], never seen on a real map.
+    pub fn low_frequencies(patch: &Patch, count: usize) -> Result<Self> {
+        Self::with_solver(patch, count, solve)
+    }
+
+    /// The same with another symmetric eigen-solver: L (n × n) and `count` to eigenvalues (all n,
+    /// ascending) and at least `count` eigenvectors as columns. Tests prove with it that the basis does not
+    /// depend on the solver.
+    #[doc(hidden)]
+    pub fn with_solver(
+        patch: &Patch,
+        count: usize,
+        solver: impl Fn(Mat<f64>, &dyn Fn(&[f64]) -> usize) -> Option<(Vec<f64>, Mat<f64>)>,
+    ) -> Result<Self> {
+        let n = patch.vertices.len();
+        let (laplacian, degrees) = symmetric_laplacian(patch);
+        let whole = |values: &[f64]| end_of_group(values, count);
+        let (values, mut vectors) =
+            solver(laplacian, &whole).ok_or(Error::NoConvergence { vertices: n })?;
+        canonicalise(&values[..whole(&values)], &mut vectors);
+        let mut vectors = vectors.subcols(0, count).to_owned();
+        let norms_squared = (0..count).map(|i| to_unit_columns(&mut vectors, i, &degrees)).collect();
+        Ok(Basis { vectors, eigenvalues: values[..count].to_vec(), degrees, norms_squared })
+    }
+
+    /// Analysis with the dual basis: the k coefficients of `values` (n of them, one axis).
+    pub fn analyse(&self, values: &[f64]) -> Vec<f64> {
+        let n = values.len();
+        let weighted = Mat::from_fn(n, 1, |v, _| values[v] * self.degrees[v]);
+        let product = self.vectors.transpose() * weighted;
+        self.norms_squared.iter().enumerate().map(|(i, norm2)| norm2 * product[(i, 0)]).collect()
+    }
+
+    /// Synthesis: E times the k `coefficients`, n values of one axis.
+    pub fn synthesise(&self, coefficients: &[f64]) -> Vec<f64> {
+        let product = &self.vectors * Mat::from_fn(coefficients.len(), 1, |i, _| coefficients[i]);
+        (0..product.nrows()).map(|v| product[(v, 0)]).collect()
+    }
+}
+
+/// L = I − D^−½ A D^−½ (n × n) and the degrees D.
+fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
+    let n = patch.vertices.len();
+    let mut degrees = vec![0.0; n];
+    for [a, b] in &patch.edges {
+        degrees[*a as usize] += 1.0;
+        degrees[*b as usize] += 1.0;
+    }
+    let mut laplacian = Mat::identity(n, n);
+    for [a, b] in &patch.edges {
+        let (a, b) = (*a as usize, *b as usize);
+        let weight = -1.0 / f64::sqrt(degrees[a] * degrees[b]);
+        laplacian[(a, b)] = weight;
+        laplacian[(b, a)] = weight;
+    }
+    (laplacian, degrees)
+}
+
+/// All eigenvalues and the first `columns(eigenvalues)` eigenvectors of a symmetric matrix:
+/// tridiagonalise, divide and conquer, transform back only the columns asked for. One thread, so
+/// that the result does not depend on how many there are.
+fn solve(mut matrix: Mat<f64>, columns: &dyn Fn(&[f64]) -> usize) -> Option<(Vec<f64>, Mat<f64>)> {
+    let n = matrix.nrows();
+    let block = qr::no_pivoting::factor::recommended_block_size::<f64>(n, n);
+    let mut params = <SelfAdjointEvdParams as Auto<f64>>::auto();
+    params.recursion_threshold = 32;
+    let scratch = StackReq::any_of(&[
+        tridiag::tridiag_in_place_scratch::<f64>(n, Par::Seq, params.tridiag.into()),
+        evd::self_adjoint_evd_scratch::<f64>(n, evd::ComputeEigenvectors::Yes, Par::Seq, params.into()),
+    ]);
+    let mut memory = MemBuffer::new(scratch);
+    let mut reflectors = Mat::zeros(block, n - 1);
+    tridiag::tridiag_in_place(
+        matrix.as_mut(),
+        reflectors.as_mut(),
+        Par::Seq,
+        MemStack::new(&mut memory),
+        params.tridiag.into(),
+    );
+    let diagonal: faer::Col<f64> = (0..n).map(|i| matrix[(i, i)]).collect();
+    let below: faer::Col<f64> = (0..n - 1).map(|i| matrix[(i + 1, i)]).collect();
+    let mut values = faer::Col::zeros(n);
+    let mut vectors = Mat::zeros(n, n);
+    evd::tridiagonal_self_adjoint_evd(
+        diagonal.as_ref().as_diagonal(),
+        below.as_ref().as_diagonal(),
+        values.as_mut().as_diagonal_mut(),
+        Some(vectors.as_mut()),
+        Par::Seq,
+        MemStack::new(&mut memory),
+        params.into(),
+    )
+    .ok()?;
+    let values: Vec<f64> = values.iter().copied().collect();
+    let count = columns(&values);
+    householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
+        matrix.submatrix(1, 0, n - 1, n - 1),
+        reflectors.as_ref(),
+        Conj::No,
+        vectors.as_mut().subcols_mut(0, count).subrows_mut(1, n - 1),
+        Par::Seq,
+        MemStack::new(&mut memory),
+    );
+    Some((values, vectors))
+}
+
+/// Where the group of equal eigenvalues that holds value `count − 1` ends.
+fn end_of_group(values: &[f64], count: usize) -> usize {
+    (count..values.len())
+        .find(|&i| values[i] - values[i - 1] >= EQUAL_EIGENVALUES)
+        .unwrap_or(values.len())
+}
+
+/// Replaces the solver's choice of basis in every group of equal eigenvalues by ours.
+fn canonicalise(values: &[f64], vectors: &mut Mat<f64>) {
+    let mut probes = Probes::new(vectors.nrows());
+    let mut start = 0;
+    while start < values.len() {
+        let end = end_of_group(values, start + 1);
+        let group = vectors.as_ref().subcols(start, end - start);
+        let rotated = group * canonical_rotation(group, probes.columns(end - start));
+        vectors.as_mut().subcols_mut(start, end - start).copy_from(rotated);
+        start = end;
+    }
+}
+
+/// The rotation Q (g × g) that takes the eigenvectors U (n × g) of one eigenvalue to a basis that
+/// depends on their subspace alone: with probes F (n × g), UᵀF = QR, diag R > 0. Any other
+/// orthonormal basis UO gives OᵀQ and so the same UQ. For g = 1 it is the sign of uᵀf.
+fn canonical_rotation(group: MatRef<'_, f64>, probes: MatRef<'_, f64>) -> Mat<f64> {
+    let size = group.ncols();
+    let seen = group.transpose() * probes;
+    let factors = seen.qr();
+    let (mut rotation, upper) = (factors.compute_thin_Q(), factors.thin_R());
+    for i in (0..size).filter(|&i| upper[(i, i)] < 0.0) {
+        for row in 0..size {
+            rotation[(row, i)] = -rotation[(row, i)];
+        }
+    }
+    rotation
+}
+
+/// Fixed pseudo-random test functions on the vertices of a patch. ChaCha20 with a published seed:
+/// anyone can make them again, and no symmetric map is orthogonal to them by its symmetry.
+///
+/// Column i is made when a group first needs it; entry (v, i) is uniform in [−1, 1).
+struct Probes {
+    columns: Mat<f64>,
+}
+
+impl Probes {
+    fn new(rows: usize) -> Self {
+        Probes { columns: Mat::zeros(rows, 0) }
+    }
+
+    /// n × count.
+    fn columns(&mut self, count: usize) -> MatRef<'_, f64> {
+        for i in self.columns.ncols()..count {
+            let mut stream = ChaCha20Rng::from_seed(*b"meshmark: canonical eigenvectors");
+            stream.set_stream(i as u64);
+            let uniform = |_, _| stream.next_u64() as i64 as f64 / 2f64.powi(63);
+            self.columns.resize_with(self.columns.nrows(), i + 1, uniform);
+        }
+        self.columns.as_ref().subcols(0, count)
+    }
+}
+
+/// Turns column i from u_i into e_i = D^−½ u_i / |D^−½ u_i| and returns |D^−½ u_i|².
+fn to_unit_columns(vectors: &mut Mat<f64>, i: usize, degrees: &[f64]) -> f64 {
+    let mut norm2 = 0.0;
+    for (v, degree) in degrees.iter().enumerate() {
+        vectors[(v, i)] /= degree.sqrt();
+        norm2 += vectors[(v, i)].powi(2);
+    }
+    for v in 0..degrees.len() {
+        vectors[(v, i)] /= norm2.sqrt();
+    }
+    norm2
+}
