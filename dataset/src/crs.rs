@@ -1,0 +1,136 @@
+//! Coordinate reference systems: metres per unit, labels, and the traditional axis order everywhere.
+
+use crate::{Error, Result};
+use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
+use meshmark_core::{ground::Ground, vertices::VertexTable};
+
+/// The CRS of a map.
+#[derive(Debug, Clone)]
+pub struct CoordinateSystem(SpatialRef);
+
+impl CoordinateSystem {
+    /// Takes a CRS as x = easting or longitude, y = northing or latitude.
+    pub fn new(mut srs: SpatialRef) -> Self {
+        srs.set_axis_mapping_strategy(AxisMappingStrategy::TraditionalGisOrder);
+        CoordinateSystem(srs)
+    }
+
+    /// "EPSG:3067", or WKT when it has no code.
+    pub fn label(&self) -> String {
+        self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
+    }
+
+    /// Whether both mean the same coordinates.
+    pub fn is_same(&self, other: &CoordinateSystem) -> bool {
+        self.0 == other.0
+    }
+
+    /// The transformation of coordinates from this CRS into `target`.
+    pub(crate) fn transform_to(&self, target: &CoordinateSystem) -> gdal::errors::Result<CoordTransform> {
+        CoordTransform::new(&self.0, &target.0)
+    }
+
+    fn ground(&self, table: &VertexTable) -> Result<Ground> {
+        if self.0.is_geocentric() {
+            return Err(Error::Geocentric(self.label()));
+        }
+        if self.0.is_geographic() {
+            return Ok(self.ellipsoid(&self.0)?);
+        }
+        let metres_per_unit = match self.measured_metres_per_unit(table.centre()) {
+            Some(measured) => measured,
+            None => self.0.linear_units(), // an engineering CRS, or a place outside the projection
+        };
+        Ok(Ground::Plane { metres_per_unit })
+    }
+
+    fn ellipsoid(&self, geographic: &SpatialRef) -> gdal::errors::Result<Ground> {
+        Ok(Ground::Ellipsoid {
+            semi_major_m: geographic.semi_major()?,
+            semi_minor_m: geographic.semi_minor()?,
+            radians_per_unit: geographic.angular_units(),
+        })
+    }
+
+    /// Metres per unit at a place: the square root of the areal scale, by differences of 100 units of
+    /// length in longitude and latitude. An EPSG:3857 unit is half a metre at Helsinki.
+    fn measured_metres_per_unit(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        if !self.0.is_projected() {
+            return None;
+        }
+        let geographic = CoordinateSystem::new(self.0.geog_cs().ok()?);
+        let step = 50.0 / self.0.linear_units();
+        let mut lon = [x - step, x + step, x, x, x];
+        let mut lat = [y, y, y - step, y + step, y];
+        let to_geographic = self.transform_to(&geographic).ok()?;
+        to_geographic.transform_coords(&mut lon, &mut lat, &mut []).ok()?;
+        let ground = self.ellipsoid(&geographic.0).ok()?;
+        let [m_lon, m_lat] = ground.metres_per_unit([lon[4], lat[4]]);
+        let side = |a: usize, b: usize| [(lon[b] - lon[a]) * m_lon, (lat[b] - lat[a]) * m_lat];
+        let (along_x, along_y) = (side(0, 1), side(2, 3));
+        let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
+        let measured = area.sqrt() / (2.0 * step);
+        (measured.is_finite() && measured > 0.0).then_some(measured)
+    }
+}
+
+/// A CRS from a user's text: EPSG:…, WKT, PROJ.
+///
+/// # Errors
+/// [`Error::UnknownSrs`].
+pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
+    let srs = SpatialRef::from_definition(text).map_err(|_| Error::UnknownSrs(text.into()))?;
+    Ok(CoordinateSystem::new(srs))
+}
+
+/// Metres on the ground for a map: its CRS decides; without one a unit is a metre, unless every
+/// coordinate could be a degree.
+pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Result<Ground> {
+    if let Some(crs) = crs {
+        return crs.ground(table);
+    }
+    let (min, max) = table.bounds();
+    let degrees = min[0] >= -180.0 && max[0] <= 180.0 && min[1] >= -90.0 && max[1] <= 90.0;
+    if degrees && !table.is_empty() {
+        return Err(Error::NoCrs);
+    }
+    Ok(Ground::Plane { metres_per_unit: 1.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn metres_per_unit(srs: &str, at: [f64; 2]) -> [f64; 2] {
+        let table = VertexTable::new(vec![at]).unwrap();
+        ground(Some(&parse_srs(srs).unwrap()), &table).unwrap().metres_per_unit(at)
+    }
+
+    #[test]
+    fn a_web_mercator_unit_is_half_a_metre_at_helsinki() {
+        let [x, y] = metres_per_unit("EPSG:3857", [2_776_000.0, 8_438_000.0]);
+        assert!((x - 0.4985).abs() < 0.003 && x == y, "{x}");
+    }
+
+    #[test]
+    fn projected_and_geographic_units_are_measured_on_the_ground() {
+        let [x, _] = metres_per_unit("EPSG:3067", [500_000.0, 6_700_000.0]);
+        assert!((x - 1.0 / 0.9996).abs() < 1e-5, "UTM central meridian: {x}");
+        let [x, _] = metres_per_unit("EPSG:2263", [1_000_000.0, 200_000.0]);
+        assert!((x - 0.3048).abs() < 1e-4, "New York, US survey feet: {x}");
+        let [x, y] = metres_per_unit("EPSG:4326", [25.0, 60.0]);
+        assert!((x - 55_800.0).abs() < 10.0 && (y - 111_412.0).abs() < 10.0, "{x} {y}");
+    }
+
+    #[test]
+    fn degrees_without_a_crs_are_refused_and_metres_without_one_are_not() {
+        let table = |x| VertexTable::new(vec![[x, 60.0]]).unwrap();
+        assert!(matches!(ground(None, &table(25.0)), Err(Error::NoCrs)));
+        assert_eq!(ground(None, &table(2500.0)).unwrap(), Ground::Plane { metres_per_unit: 1.0 });
+    }
+
+    #[test]
+    fn an_unknown_srs_is_named() {
+        assert!(parse_srs("EPSG:nowhere").unwrap_err().to_string().contains("SRS=EPSG:nowhere"));
+    }
+}

@@ -1,0 +1,66 @@
+//! Labels: attribute texts with the place they stand for, from which a verifier makes landmarks.
+
+use crate::survey::LabelFields;
+use gdal::vector::{Feature, FieldValue, Geometry};
+use geo::{Centroid, HasDimensions, dimensions::Dimensions};
+
+/// What kind of place a label has. Lines are the least certain: they are cut and merged by others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// The point itself.
+    Point,
+    /// The centroid by length.
+    Line,
+    /// The centroid by area.
+    Area,
+}
+
+/// An attribute value of a feature and the feature's place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Label {
+    /// A string, or an integer in decimal.
+    pub value: String,
+    /// CRS units.
+    pub point: [f64; 2],
+    /// What the point is of.
+    pub dimension: Dimension,
+}
+
+/// The labels of one feature.
+pub(crate) fn of_feature(feature: &Feature, fields: &LabelFields, labels: &mut Vec<Label>) {
+    let values: Vec<String> = feature
+        .fields()
+        .filter(|(name, _)| fields.wants(name))
+        .filter_map(|(_, value)| text(value?))
+        .collect();
+    if values.is_empty() {
+        return;
+    }
+    let Some((point, dimension)) = feature.geometry().and_then(place) else { return };
+    labels.extend(values.into_iter().map(|value| Label { value, point, dimension }));
+}
+
+fn text(value: FieldValue) -> Option<String> {
+    let text = match value {
+        FieldValue::StringValue(text) => text.trim().to_string(),
+        FieldValue::IntegerValue(number) => number.to_string(),
+        FieldValue::Integer64Value(number) => number.to_string(),
+        _ => return None,
+    };
+    (!text.is_empty()).then_some(text)
+}
+
+fn place(geometry: &Geometry) -> Option<([f64; 2], Dimension)> {
+    if !geometry.has_gdal_ptr() || geometry.is_empty() {
+        return None;
+    }
+    let geometry = geometry.to_geo().ok()?; // curves have no counterpart in geo and give no label
+    let dimension = match geometry.dimensions() {
+        Dimensions::Empty => return None,
+        Dimensions::ZeroDimensional => Dimension::Point,
+        Dimensions::OneDimensional => Dimension::Line,
+        Dimensions::TwoDimensional => Dimension::Area,
+    };
+    let centroid = geometry.centroid()?;
+    (centroid.x().is_finite() && centroid.y().is_finite()).then_some(([centroid.x(), centroid.y()], dimension))
+}
