@@ -1,7 +1,10 @@
 //! The carrier: keyed chips that spread the message over the coefficients (paper, section 3.4).
 
 use crate::key::SecretKey;
-use rand_chacha::{ChaCha20Rng, rand_core::{Rng, SeedableRng}};
+use rand_chacha::{
+    ChaCha20Rng,
+    rand_core::{Rng, SeedableRng},
+};
 
 /// Chips p_i = ±1, one sequence for each patch and axis: equal carriers could be averaged out of a map.
 pub struct Carrier {

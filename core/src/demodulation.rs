@@ -12,7 +12,10 @@ use crate::{
     patches::{Patch, Patches},
     spectrum::Basis,
 };
-use faer::{Mat, Side, linalg::solvers::{Llt, Solve}};
+use faer::{
+    Mat, Side,
+    linalg::solvers::{Llt, Solve},
+};
 use rayon::prelude::*;
 
 /// Displacements are never trusted to better than this.
@@ -123,7 +126,8 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     let count = sums.correlations.len().max(1) as f64;
     let explained: f64 = estimate.iter().zip(&sums.scores).map(|(b, q)| b * q).sum();
     let explained = explained * job.parameters.amplitude_m * ratio(sums.trace, count);
-    let spread2 = ((dot(&sums.correlations, &sums.correlations) - explained) / count).max(LEAST_NOISE_M.powi(2));
+    let spread2 =
+        ((dot(&sums.correlations, &sums.correlations) - explained) / count).max(LEAST_NOISE_M.powi(2));
     let chips_of_bit = count / job.bits as f64;
     let variance = |j: usize| if gain(j) > 0.0 { spread2 * chips_of_bit / gain(j).powi(2) } else { 1.0 };
     Demodulation {
@@ -298,9 +302,8 @@ impl<'a> Job<'a> {
                 let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
                 let chips = [0, 1].map(|a| self.carrier.chips(index * block + offset, a, self.carriers));
                 let found = patch.vertices.iter().enumerate();
-                let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) = found
-                    .filter_map(|(row, &v)| Some((row, self.observed[v as usize]?)))
-                    .unzip();
+                let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) =
+                    found.filter_map(|(row, &v)| Some((row, self.observed[v as usize]?))).unzip();
                 let sums = f(&basis, &rows, &displacement, &chips);
                 match &mut total {
                     None => total = Some(sums),
@@ -310,8 +313,13 @@ impl<'a> Job<'a> {
             }
             Ok(total.expect("a block has patches"))
         };
-        let blocks: Vec<Sums> =
-            all.par_chunks(block).enumerate().map(sum_block).collect::<Result<_>>()?;
-        Ok(blocks.into_iter().reduce(|mut a, b| { a.add(b); a }).expect("a map has patches"))
+        let blocks: Vec<Sums> = all.par_chunks(block).enumerate().map(sum_block).collect::<Result<_>>()?;
+        Ok(blocks
+            .into_iter()
+            .reduce(|mut a, b| {
+                a.add(b);
+                a
+            })
+            .expect("a map has patches"))
     }
 }

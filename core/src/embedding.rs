@@ -129,16 +129,9 @@ impl Job<'_> {
         }
     }
 
-    fn scores(
-        &self,
-        patch: &Patch,
-        basis: &Basis,
-        chips: &[Vec<f64>; 2],
-        coords: &[[f64; 2]],
-    ) -> Vec<f64> {
-        let moved = |(&v, &to): (&u32, &[f64; 2])| {
-            self.ground.metres_between(self.table.coords()[v as usize], to)
-        };
+    fn scores(&self, patch: &Patch, basis: &Basis, chips: &[Vec<f64>; 2], coords: &[[f64; 2]]) -> Vec<f64> {
+        let moved =
+            |(&v, &to): (&u32, &[f64; 2])| self.ground.metres_between(self.table.coords()[v as usize], to);
         let moved: Vec<[f64; 2]> = patch.vertices.iter().zip(coords).map(moved).collect();
         let mut scores = vec![0.0; self.signs.len()];
         for (axis, chips) in chips.iter().enumerate() {

@@ -37,9 +37,8 @@ impl SecretKey {
     pub fn from_json(text: &str) -> Result<Self> {
         let malformed = |reason: &str| Error::Key(reason.to_string());
         // serde's own messages may quote values of the file, so they are not passed on.
-        let file: KeyFile = serde_json::from_str(text).map_err(|_| {
-            malformed("it is not JSON with exactly the fields meshmark_key, id and secret")
-        })?;
+        let file: KeyFile = serde_json::from_str(text)
+            .map_err(|_| malformed("it is not JSON with exactly the fields meshmark_key, id and secret"))?;
         if file.meshmark_key != VERSION {
             return Err(malformed(&format!("version {} instead of {VERSION}", file.meshmark_key)));
         }

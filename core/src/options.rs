@@ -45,17 +45,77 @@ const fn row(
 
 /// All options, in the order of the docs.
 pub const OPTIONS: &[OptionSpec] = &[
-    row("KEY", Kind::Text, None, false, "Key file made by `meshmark keygen`; or configuration option MESHMARK_KEY"),
-    row("RECIPIENT", Kind::Text, None, true, "Who receives this copy; the message is 128 bits of a keyed hash of this text"),
-    row("MESSAGE", Kind::Text, None, true, "The message itself, 2 to 256 hexadecimal digits, instead of RECIPIENT"),
-    row("AMPLITUDE", Kind::Number(0.0, 1e6), Some("0.10"), true, "Amplitude of every coefficient, metres on the ground"),
-    row("CHIP_RATE", Kind::Integer(1, 2048), Some("2"), true, "Coefficients that carry each message bit, per patch and axis"),
-    row("PATCH_SIZE", Kind::Integer(PATCH_SIZE_RANGE.0, PATCH_SIZE_RANGE.1), Some("480"), true, "Smallest number of vertices in a patch"),
-    row("TOLERANCE", Kind::Number(0.0, 1e6), Some("0.75"), true, "No vertex moves further than this, metres on the ground"),
-    row("PRECISION", Kind::Number(0.0, 1e6), None, true, "Grid of the marked coordinates, CRS units; none by default"),
-    row("LAYERS", Kind::Text, None, true, "Comma-separated layers to mark together; the others pass unchanged; all by default"),
+    row(
+        "KEY",
+        Kind::Text,
+        None,
+        false,
+        "Key file made by `meshmark keygen`; or configuration option MESHMARK_KEY",
+    ),
+    row(
+        "RECIPIENT",
+        Kind::Text,
+        None,
+        true,
+        "Who receives this copy; the message is 128 bits of a keyed hash of this text",
+    ),
+    row(
+        "MESSAGE",
+        Kind::Text,
+        None,
+        true,
+        "The message itself, 2 to 256 hexadecimal digits, instead of RECIPIENT",
+    ),
+    row(
+        "AMPLITUDE",
+        Kind::Number(0.0, 1e6),
+        Some("0.10"),
+        true,
+        "Amplitude of every coefficient, metres on the ground",
+    ),
+    row(
+        "CHIP_RATE",
+        Kind::Integer(1, 2048),
+        Some("2"),
+        true,
+        "Coefficients that carry each message bit, per patch and axis",
+    ),
+    row(
+        "PATCH_SIZE",
+        Kind::Integer(PATCH_SIZE_RANGE.0, PATCH_SIZE_RANGE.1),
+        Some("480"),
+        true,
+        "Smallest number of vertices in a patch",
+    ),
+    row(
+        "TOLERANCE",
+        Kind::Number(0.0, 1e6),
+        Some("0.75"),
+        true,
+        "No vertex moves further than this, metres on the ground",
+    ),
+    row(
+        "PRECISION",
+        Kind::Number(0.0, 1e6),
+        None,
+        true,
+        "Grid of the marked coordinates, CRS units; none by default",
+    ),
+    row(
+        "LAYERS",
+        Kind::Text,
+        None,
+        true,
+        "Comma-separated layers to mark together; the others pass unchanged; all by default",
+    ),
     row("SRS", Kind::Text, None, true, "CRS of the source when it has none, for example EPSG:3067"),
-    row("RECORD", Kind::Text, None, false, "Record file to write: what an auditor needs besides the key and the reference"),
+    row(
+        "RECORD",
+        Kind::Text,
+        None,
+        false,
+        "Record file to write: what an auditor needs besides the key and the reference",
+    ),
 ];
 
 /// Looks a row up by its name, in any case.
@@ -216,9 +276,7 @@ impl<'a> Values<'a> {
         let value = self.given(name).or(spec.default).expect("has a default");
         match value.trim().parse::<usize>() {
             Ok(number) if (least..=most).contains(&number) => Ok(number),
-            _ => Err(Error::Option(format!(
-                "{name}={value} is not a whole number from {least} to {most}"
-            ))),
+            _ => Err(Error::Option(format!("{name}={value} is not a whole number from {least} to {most}"))),
         }
     }
 }
@@ -236,10 +294,7 @@ fn option_xml(option: &OptionSpec) -> String {
         Kind::Integer(least, most) => ("int", format!(" min='{least}' max='{most}'")),
     };
     let default = option.default.map_or(String::new(), |d| format!(" default='{d}'"));
-    format!(
-        "<Option name='{}' type='{kind}'{range}{default} description='{}'/>",
-        option.name, option.help
-    )
+    format!("<Option name='{}' type='{kind}'{range}{default} description='{}'/>", option.name, option.help)
 }
 
 /// The options as a Markdown table, for the docs.

@@ -6,7 +6,10 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::evd::{self, SelfAdjointEvdParams, tridiag};
 use faer::linalg::{householder, qr};
 use faer::{Auto, Conj, Mat, MatRef, Par};
-use rand_chacha::{ChaCha20Rng, rand_core::{Rng, SeedableRng}};
+use rand_chacha::{
+    ChaCha20Rng,
+    rand_core::{Rng, SeedableRng},
+};
 
 /// Eigenvalues closer than this are one subspace: its basis is chosen by [`canonical_rotation`], not
 /// by the solver.
@@ -50,8 +53,7 @@ impl Basis {
         let n = patch.vertices.len();
         let (laplacian, degrees) = symmetric_laplacian(patch);
         let whole = |values: &[f64]| end_of_group(values, count);
-        let (values, mut vectors) =
-            solver(laplacian, &whole).ok_or(Error::NoConvergence { vertices: n })?;
+        let (values, mut vectors) = solver(laplacian, &whole).ok_or(Error::NoConvergence { vertices: n })?;
         canonicalise(&values[..whole(&values)], &mut vectors);
         let mut vectors = vectors.subcols(0, count).to_owned();
         let norms_squared = (0..count).map(|i| to_unit_columns(&mut vectors, i, &degrees)).collect();
@@ -141,9 +143,7 @@ fn solve(mut matrix: Mat<f64>, columns: &dyn Fn(&[f64]) -> usize) -> Option<(Vec
 
 /// Where the group of equal eigenvalues that holds value `count − 1` ends.
 fn end_of_group(values: &[f64], count: usize) -> usize {
-    (count..values.len())
-        .find(|&i| values[i] - values[i - 1] >= EQUAL_EIGENVALUES)
-        .unwrap_or(values.len())
+    (count..values.len()).find(|&i| values[i] - values[i - 1] >= EQUAL_EIGENVALUES).unwrap_or(values.len())
 }
 
 /// Replaces the solver's choice of basis in every group of equal eigenvalues by ours.

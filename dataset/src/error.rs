@@ -30,6 +30,8 @@ pub enum Error {
     Unreadable { layer: String, reason: String },
     #[error("coordinates of layer \"{layer}\" cannot be brought into the CRS of the reference: {reason}")]
     Reprojection { layer: String, reason: String },
+    #[error("the map has more than {most} vertices: cut it into sheets")]
+    TooLarge { most: usize },
     #[error(transparent)]
     Gdal(#[from] gdal::errors::GdalError),
     #[error(transparent)]

@@ -62,5 +62,6 @@ fn place(geometry: &Geometry) -> Option<([f64; 2], Dimension)> {
         Dimensions::TwoDimensional => Dimension::Area,
     };
     let centroid = geometry.centroid()?;
-    (centroid.x().is_finite() && centroid.y().is_finite()).then_some(([centroid.x(), centroid.y()], dimension))
+    (centroid.x().is_finite() && centroid.y().is_finite())
+        .then_some(([centroid.x(), centroid.y()], dimension))
 }

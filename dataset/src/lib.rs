@@ -12,4 +12,7 @@ pub mod wkb;
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
 pub use labels::{Dimension, Label};
-pub use survey::{LabelFields, Selection, Survey, survey};
+/// The most vertices a map may have: their numbers are 32 bits wide.
+pub const MOST_VERTICES: usize = u32::MAX as usize;
+
+pub use survey::{LabelFields, Selection, Survey, Target, survey};

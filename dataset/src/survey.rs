@@ -28,6 +28,17 @@ impl LabelFields<'_> {
     }
 }
 
+/// Which CRS coordinates are read in.
+#[derive(Debug, Clone, Copy)]
+pub enum Target<'a> {
+    /// Their own, which all chosen layers must share.
+    Own,
+    /// This one: layers in another CRS are reprojected.
+    Crs(&'a CoordinateSystem),
+    /// Whatever they are in: the numbers as they stand.
+    Raw,
+}
+
 /// What to read of a dataset, and how.
 #[derive(Clone, Copy)]
 pub struct Selection<'a> {
@@ -37,8 +48,10 @@ pub struct Selection<'a> {
     pub srs: Option<&'a str>,
     /// Attributes to take along.
     pub labels: LabelFields<'a>,
-    /// Reproject into this CRS; layers may then differ in theirs.
-    pub into: Option<&'a CoordinateSystem>,
+    /// Which CRS the coordinates shall be in.
+    pub target: Target<'a>,
+    /// Refuse a map of more vertices, duplicates included.
+    pub most_vertices: usize,
     /// What GDAL's last failure was, if there was one since the walk began: drivers end a layer early on a
     /// read error, and only the process's error handler tells that from its end.
     pub last_failure: &'a dyn Fn() -> Option<String>,
@@ -78,9 +91,9 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     for name in &names {
         walk.layer(&mut dataset.layer_by_name(name)?, name)?;
     }
-    let crs = match selection.into {
-        Some(target) => Some(target.clone()),
-        None => walk.crs.and_then(|(_, crs)| crs),
+    let crs = match selection.target {
+        Target::Crs(target) => Some(target.clone()),
+        Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
     let vertices = VertexTable::new(walk.coords)?;
     let ground = match crs::ground(crs.as_ref(), &vertices) {
@@ -115,11 +128,15 @@ struct Walk<'a> {
 impl Walk<'_> {
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<()> {
         let columns = self.columns(layer)?;
-        let (first_coord, first_label) = (self.coords.len(), self.labels.len());
+        let first_label = self.labels.len();
         let mut of_column: Vec<Vec<[f64; 2]>> = vec![Vec::new(); columns.len()];
         for feature in layer.features() {
             for (column, coords) in of_column.iter_mut().enumerate() {
                 read_geometry(&feature, column, name, coords)?;
+            }
+            let vertices = self.coords.len() + of_column.iter().map(Vec::len).sum::<usize>();
+            if vertices > self.selection.most_vertices {
+                return Err(Error::TooLarge { most: self.selection.most_vertices });
             }
             if !matches!(self.selection.labels, LabelFields::None) {
                 labels::of_feature(&feature, &self.selection.labels, &mut self.labels);
@@ -129,20 +146,19 @@ impl Walk<'_> {
             return Err(Error::Unreadable { layer: name.into(), reason });
         }
         for (crs, coords) in columns.iter().zip(&mut of_column) {
-            match self.selection.into {
-                Some(target) => reproject(coords, crs.as_ref(), target, name)?,
-                None if !coords.is_empty() => self.check_crs(name, crs)?,
-                None => {}
+            match self.selection.target {
+                Target::Crs(target) => reproject(coords, crs.as_ref(), target, name)?,
+                Target::Own if !coords.is_empty() => self.check_crs(name, crs)?,
+                Target::Own | Target::Raw => {}
             }
             self.coords.append(coords);
         }
-        if let (Some(target), Some(crs)) = (self.selection.into, columns.first()) {
+        if let (Target::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
             let labels = &mut self.labels[first_label..];
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             reproject(&mut points, crs.as_ref(), target, name)?;
             labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
         }
-        debug_assert!(self.coords.len() >= first_coord);
         Ok(())
     }
 
@@ -185,12 +201,7 @@ impl Walk<'_> {
 }
 
 /// Appends the coordinates of one geometry of a feature.
-fn read_geometry(
-    feature: &Feature,
-    column: usize,
-    layer: &str,
-    coords: &mut Vec<[f64; 2]>,
-) -> Result<()> {
+fn read_geometry(feature: &Feature, column: usize, layer: &str, coords: &mut Vec<[f64; 2]>) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
     let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
     let mut visit = |[x, y]: [f64; 2]| {

@@ -179,10 +179,7 @@ mod tests {
                 "CURVEPOLYGON (COMPOUNDCURVE (CIRCULARSTRING (100 1000,101 1001,102 1000),(102 1000,100 1000)))",
             ),
             ("MULTICURVE ((1 2,3 4))", "MULTICURVE ((101 1002,103 1004))"),
-            (
-                "MULTISURFACE (((0 0,9 0,9 9,0 0)))",
-                "MULTISURFACE (((100 1000,109 1000,109 1009,100 1000)))",
-            ),
+            ("MULTISURFACE (((0 0,9 0,9 9,0 0)))", "MULTISURFACE (((100 1000,109 1000,109 1009,100 1000)))"),
             (
                 "POLYHEDRALSURFACE Z (((0 0 5,9 0 5,9 9 5,0 0 5)))",
                 "POLYHEDRALSURFACE Z (((100 1000 5,109 1000 5,109 1009 5,100 1000 5)))",
