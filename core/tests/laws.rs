@@ -1,0 +1,271 @@
+//! The laws that embedding and detection rest on.
+
+use faer::Mat;
+use meshmark_core::{
+    carrier::Carrier,
+    demodulation::{self, Demodulation},
+    embedding::embed,
+    ground::Ground,
+    key::SecretKey,
+    message::Message,
+    options::Parameters,
+    patches::{Patch, Patches},
+    spectrum::Basis,
+    vertices::VertexTable,
+};
+use proptest::prelude::*;
+
+const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
+const MESSAGE: &str = "0123456789abcdef";
+
+fn key() -> SecretKey {
+    SecretKey::from_bytes([42; 32])
+}
+
+/// Parameters for small maps: 64 bits, two patches of at least 150 vertices.
+fn small() -> Parameters {
+    Parameters { patch_size: 150, ..Parameters::default() }
+}
+
+/// Distinct random vertices on about a square kilometre.
+fn vertices() -> impl Strategy<Value = Vec<[f64; 2]>> {
+    prop::collection::btree_set((0..1_000_000i32, 0..1_000_000i32), 300..500)
+        .prop_map(|set| set.into_iter().map(|(x, y)| [f64::from(x) / 1e3, f64::from(y) / 1e3]).collect())
+}
+
+fn marked(table: &VertexTable, ground: &Ground, parameters: &Parameters) -> Vec<[f64; 2]> {
+    let message = Message::from_hex(MESSAGE).unwrap();
+    embed(table, ground, &key(), &message, parameters).unwrap().coords
+}
+
+fn observed(table: &VertexTable, ground: &Ground, moved: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+    table.coords().iter().zip(moved).map(|(a, b)| Some(ground.metres_between(*a, *b))).collect()
+}
+
+fn read_back(
+    table: &VertexTable,
+    ground: &Ground,
+    observed: &[Option<[f64; 2]>],
+    p: &Parameters,
+) -> [Demodulation; 2] {
+    let patches = Patches::new(table, ground, p.patch_size).unwrap();
+    patches.validate().unwrap();
+    [demodulation::paper, demodulation::joint]
+        .map(|demodulate| demodulate(&patches, &Carrier::new(&key()), observed, 64, p, &|_| ()).unwrap())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn analysis_after_synthesis_is_the_identity(
+        points in vertices(),
+        seed in prop::collection::vec(-1.0..1.0f64, 500),
+    ) {
+        let table = VertexTable::new(points).unwrap();
+        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        for patch in patches.as_slice() {
+            let n = patch.vertices.len();
+            let basis = Basis::low_frequencies(patch, n).unwrap();
+            let back = basis.analyse(&basis.synthesise(&seed[..n]));
+            let worst = back.iter().zip(&seed).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            prop_assert!(worst < 1e-9, "{worst}");
+        }
+    }
+
+    #[test]
+    fn eigenvectors_satisfy_the_biggs_laplacian(points in vertices()) {
+        let table = VertexTable::new(points).unwrap();
+        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        let patch = &patches.as_slice()[0];
+        let basis = Basis::low_frequencies(patch, 100).unwrap();
+        for i in 0..100 {
+            // R e = e − D⁻¹ A e, computed from the edges alone.
+            let e = |v: u32| basis.vectors[(v as usize, i)];
+            let mut image: Vec<f64> = (0..patch.vertices.len() as u32).map(e).collect();
+            for &[a, b] in &patch.edges {
+                image[a as usize] -= e(b) / basis.degrees[a as usize];
+                image[b as usize] -= e(a) / basis.degrees[b as usize];
+            }
+            for (v, value) in image.iter().enumerate() {
+                prop_assert!((value - basis.eigenvalues[i] * e(v as u32)).abs() < 1e-9);
+            }
+        }
+        prop_assert!(basis.eigenvalues[0].abs() < 1e-12 && basis.eigenvalues[1] > 1e-6);
+    }
+
+    #[test]
+    fn embedding_does_not_depend_on_the_order_of_the_vertices(points in vertices(), turn in 1..299usize) {
+        let mut shuffled = points.clone();
+        shuffled.rotate_left(turn);
+        shuffled.extend_from_slice(&points[..50]); // shared vertices occur more than once
+        let (a, b) = (VertexTable::new(points).unwrap(), VertexTable::new(shuffled).unwrap());
+        prop_assert_eq!(&a, &b);
+        prop_assert_eq!(marked(&a, &METRES, &small()), marked(&b, &METRES, &small()));
+    }
+
+    #[test]
+    fn no_vertex_moves_further_than_the_tolerance_and_every_one_is_on_the_grid(
+        points in vertices(),
+        tolerance_m in 0.12..0.3f64,
+        precision in prop::sample::select(vec![None, Some(0.1), Some(0.01), Some(0.03)]),
+    ) {
+        let table = VertexTable::new(points).unwrap();
+        let p = Parameters { tolerance_m, precision, amplitude_m: 0.2, ..small() };
+        for (from, to) in table.coords().iter().zip(marked(&table, &METRES, &p)) {
+            prop_assert!((to[0] - from[0]).hypot(to[1] - from[1]) <= tolerance_m);
+            if let Some(grid) = precision {
+                prop_assert!(to.iter().all(|v| (v / grid - (v / grid).round()).abs() < 1e-6));
+            }
+        }
+    }
+
+    #[test]
+    fn both_demodulators_read_the_message_when_half_of_the_vertices_are_gone(points in vertices()) {
+        let table = VertexTable::new(points).unwrap();
+        let p = Parameters { amplitude_m: 0.1, ..small() };
+        let mut seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
+        for found in read_back(&table, &METRES, &seen, &p) {
+            prop_assert_eq!(found.message().to_hex(), MESSAGE);
+        }
+        for displacement in seen.iter_mut().step_by(2) {
+            *displacement = None;
+        }
+        let message = Message::from_hex(MESSAGE).unwrap();
+        let [paper, joint] = read_back(&table, &METRES, &seen, &p);
+        prop_assert!(joint.mark_score(&message) > 8.0 && paper.mark_score(&message) > 8.0);
+        prop_assert!(joint.message().errors(&message) <= paper.message().errors(&message));
+    }
+}
+
+#[test]
+fn degrees_are_marked_in_metres_and_the_seam_stays() {
+    let mut coords: Vec<[f64; 2]> =
+        (0..400).map(|i| [179.0 + f64::from(i % 20) * 0.05, 59.0 + f64::from(i / 20) * 0.07]).collect();
+    coords.extend((0..20).map(|i| [180.0, 59.03 + f64::from(i) * 0.07]));
+    let table = VertexTable::new(coords).unwrap();
+    let p = small();
+    let moved = marked(&table, &Ground::WGS84, &p);
+    let seen = observed(&table, &Ground::WGS84, &moved);
+    let metres: Vec<f64> = seen.iter().map(|d| d.map_or(0.0, |[x, y]| x.hypot(y))).collect();
+    assert!(metres.iter().cloned().fold(0.0, f64::max) < 0.75);
+    assert!(metres.iter().sum::<f64>() / metres.len() as f64 > 0.05);
+    for (from, to) in table.coords().iter().zip(&moved) {
+        assert_eq!(from[0] == 180.0, from == to, "only the seam stays: {from:?}");
+    }
+}
+
+#[test]
+fn output_is_bit_equal_for_any_number_of_threads() {
+    let table = grid(40);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| marked(&table, &METRES, &small()))
+    };
+    assert!(with(1) == with(2) && with(2) == with(8));
+}
+
+/// A square grid of side² vertices, 10 m apart: hundreds of repeated eigenvalues.
+fn grid(side: i32) -> VertexTable {
+    let coords = (0..side * side).map(|i| [f64::from(i % side) * 10.0, f64::from(i / side) * 10.0]);
+    VertexTable::new(coords.collect()).unwrap()
+}
+
+/// Clusters so far apart that the patches between them fall apart.
+fn clusters() -> VertexTable {
+    let mut coords = Vec::new();
+    for cluster in 0..7 {
+        let (cx, cy) = (f64::from(cluster % 3) * 5000.0, f64::from(cluster / 3) * 4000.0);
+        for i in 0..64 {
+            coords.push([cx + f64::from(i % 8), cy + f64::from(i / 8)]);
+        }
+    }
+    VertexTable::new(coords).unwrap()
+}
+
+fn by_nalgebra(matrix: Mat<f64>, _: &dyn Fn(&[f64]) -> usize) -> Option<(Vec<f64>, Mat<f64>)> {
+    let n = matrix.nrows();
+    let solved = nalgebra::DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]).symmetric_eigen();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| solved.eigenvalues[a].total_cmp(&solved.eigenvalues[b]));
+    let vectors = Mat::from_fn(n, n, |i, j| solved.eigenvectors[(i, order[j])]);
+    Some((order.iter().map(|&i| solved.eigenvalues[i]).collect(), vectors))
+}
+
+fn largest_difference(patch: &Patch, count: usize) -> f64 {
+    let ours = Basis::low_frequencies(patch, count).unwrap();
+    let theirs = Basis::with_solver(patch, count, by_nalgebra).unwrap();
+    let difference = &ours.vectors - &theirs.vectors;
+    difference.norm_max()
+}
+
+#[test]
+fn another_solver_gives_the_same_basis_on_grids_and_on_patches_that_fall_apart() {
+    for table in [grid(20), grid(25), clusters()] {
+        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        for patch in patches.as_slice() {
+            assert!(largest_difference(patch, 129) < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn a_complete_grid_patch_has_repeated_eigenvalues_and_still_one_basis() {
+    // Without the canonical choice this fails: the two solvers rotate repeated eigenvectors freely.
+    let side = 12u32;
+    let mut edges = Vec::new();
+    for i in 0..side * side {
+        if i % side + 1 < side {
+            edges.push([i, i + 1]);
+        }
+        if i + side < side * side {
+            edges.push([i, i + side]);
+        }
+    }
+    edges.sort_unstable();
+    let patch = Patch { vertices: (0..side * side).collect(), edges };
+    let values = Basis::low_frequencies(&patch, 100).unwrap().eigenvalues;
+    assert!(values.windows(2).filter(|w| w[1] - w[0] < 1e-8).count() > 20, "no repeated eigenvalues");
+    for count in [99, 100, 101] {
+        assert!(largest_difference(&patch, count) < 1e-6);
+    }
+}
+
+#[test]
+fn a_mark_made_with_one_solver_is_read_with_another() {
+    for table in [grid(20), clusters()] {
+        let p = small();
+        let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
+        let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+        let mut scores = vec![0.0; 64];
+        for (number, patch) in patches.as_slice().iter().enumerate() {
+            let basis = Basis::with_solver(patch, 129, by_nalgebra).unwrap();
+            for axis in 0..2 {
+                let values: Vec<f64> =
+                    patch.vertices.iter().map(|&v| seen[v as usize].unwrap()[axis]).collect();
+                let coefficients = basis.analyse(&values);
+                for (i, chip) in Carrier::new(&key()).chips(number, axis, 128).iter().enumerate() {
+                    scores[i / 2] += chip * coefficients[i + 1];
+                }
+            }
+        }
+        assert_eq!(Message::from_signs(&scores).to_hex(), MESSAGE);
+    }
+}
+
+#[test]
+fn decoy_keys_score_like_a_standard_normal_on_a_marked_map() {
+    let table = grid(25);
+    let p = small();
+    let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
+    let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+    let message = Message::from_hex(MESSAGE).unwrap();
+    let score = |seed: u8| {
+        let carrier = Carrier::new(&SecretKey::from_bytes([seed; 32]));
+        demodulation::paper(&patches, &carrier, &seen, 64, &p, &|_| ()).unwrap().mark_score(&message)
+    };
+    let scores: Vec<f64> = (100..200).map(score).collect();
+    let spread = (scores.iter().map(|s| s * s).sum::<f64>() / 100.0).sqrt();
+    assert!((0.7..1.3).contains(&spread), "{spread}");
+    assert!(score(42) > 15.0, "{}", score(42));
+}
