@@ -1,0 +1,49 @@
+# Every target installs what it needs and is missing (with sudo when not root).
+SHELL := /bin/bash
+CARGO ?= cargo
+BUILD := target/release
+PLUGINS := $(BUILD)/gdalplugins
+PLUGIN := $(PLUGINS)/ogr_MESHMARK.so
+PREFIX ?= /usr/local
+# GDAL's own plugin folder, where every program finds the driver without a variable.
+GDAL_PLUGIN_DIR ?= $(shell pkg-config --variable=libdir gdal 2>/dev/null || echo $(PREFIX)/lib)/gdalplugins
+# Maps that `make bench` measures; name your own with MAPS="a.gpkg b.gpkg".
+MAPS ?= $(or $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/jp_tokyo_adachi_6km.gpkg),fixtures/helsinki.gpkg)
+
+.PHONY: build test demo bench conformance install uninstall fixtures deps lint
+
+build: deps
+	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
+	mkdir -p $(PLUGINS)
+	install -m 755 $(BUILD)/libmeshmark_plugin.so $(PLUGIN)
+
+test: build
+	$(CARGO) test --release --locked --workspace
+
+demo: build
+	GDAL_DRIVER_PATH=$(CURDIR)/$(PLUGINS) ./demo.sh $(BUILD)/meshmark fixtures/helsinki.gpkg
+
+bench: build
+	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(BUILD)/bench $(MAPS)
+
+conformance: build
+	host-tests/conformance/run.sh
+
+fixtures:
+	fixtures/make_fixtures.sh
+
+install: build
+	install -d "$(DESTDIR)$(GDAL_PLUGIN_DIR)" "$(DESTDIR)$(PREFIX)/bin"
+	install -m 755 $(PLUGIN) "$(DESTDIR)$(GDAL_PLUGIN_DIR)/"
+	install -m 755 $(BUILD)/meshmark "$(DESTDIR)$(PREFIX)/bin/"
+
+uninstall:
+	rm -f "$(DESTDIR)$(GDAL_PLUGIN_DIR)/ogr_MESHMARK.so" "$(DESTDIR)$(PREFIX)/bin/meshmark"
+
+lint: deps
+	$(CARGO) fmt --all -- --check
+	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
+
+deps:
+	@./install-deps.sh
