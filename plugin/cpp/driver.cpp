@@ -1,0 +1,124 @@
+// Registration, and how a marked dataset comes to be.
+
+#include "shim.h"
+
+#include <exception>
+
+static bool HasPrefix(const char *name)
+{
+    return STARTS_WITH_CI(name, MESHMARK_PREFIX);
+}
+
+static void ReportException(const char *reason)
+{
+    CPLError(CE_Failure, CPLE_AppDefined, "MESHMARK failed inside: %s", reason);
+}
+
+// GDAL's writers delete a file of the output's name before they make their own, by the driver that
+// identifies it. While a map is being read through MESHMARK, that driver is this one, and Delete
+// below refuses. Only GDALIdentifyDriver gives no flags; opening always does.
+static int Identify(GDALOpenInfo *info)
+{
+    return HasPrefix(info->pszFilename) ||
+           (info->nOpenFlags == 0 && meshmark_is_being_read(info->pszFilename));
+}
+
+static void RefuseToWrite(const char *name)
+{
+    CPLError(CE_Failure, CPLE_AppDefined,
+             "%s is being read through MESHMARK and cannot be written at the same time: write the "
+             "marked map to another file",
+             name);
+}
+
+static GDALDataset *Open(GDALOpenInfo *info)
+{
+    const char *name = info->pszFilename;
+    if (!HasPrefix(name))
+    {
+        if (info->eAccess == GA_Update && meshmark_is_being_read(name))
+            RefuseToWrite(name);
+        return nullptr;
+    }
+    if (info->eAccess == GA_Update)
+    {
+        CPLError(CE_Failure, CPLE_OpenFailed, "%s cannot be opened for update: it is a view that can only be read",
+                 name);
+        return nullptr;
+    }
+    try
+    {
+        GDALDatasetH source = nullptr;
+        const char *source_name = name + strlen(MESHMARK_PREFIX);
+        MeshmarkMarking *marking = meshmark_open(source_name, info->papszOpenOptions, &source);
+        return marking ? new MeshmarkDataset(GDALDataset::FromHandle(source), marking) : nullptr;
+    }
+    catch (const std::exception &e)
+    {
+        ReportException(e.what());
+        return nullptr;
+    }
+}
+
+static CPLErr Delete(const char *name)
+{
+    if (HasPrefix(name))
+        CPLError(CE_Failure, CPLE_NotSupported, "%s is a view of a dataset: delete the dataset itself", name);
+    else
+        RefuseToWrite(name);
+    return CE_Failure;
+}
+
+static GDALDriver *NewDriver()
+{
+    auto driver = std::make_unique<GDALDriver>();
+    driver->SetDescription(MESHMARK_DRIVER);
+    driver->SetMetadataItem(GDAL_DMD_LONGNAME, "Watermarked view of a vector map");
+    driver->SetMetadataItem(GDAL_DMD_HELPTOPIC, "docs/driver.md");
+    driver->SetMetadataItem(GDAL_DMD_CONNECTION_PREFIX, MESHMARK_PREFIX);
+    driver->SetMetadataItem(GDAL_DMD_OPENOPTIONLIST, meshmark_option_list());
+    for (const char *capability :
+         {GDAL_DCAP_VECTOR, GDAL_DCAP_VIRTUALIO, GDAL_DCAP_FIELD_DOMAINS, GDAL_DCAP_RELATIONSHIPS,
+          GDAL_DCAP_Z_GEOMETRIES, GDAL_DCAP_MEASURED_GEOMETRIES, GDAL_DCAP_CURVE_GEOMETRIES,
+          GDAL_DCAP_FEATURE_STYLES, GDAL_DCAP_MULTIPLE_VECTOR_LAYERS})
+        driver->SetMetadataItem(capability, "YES");
+    driver->pfnIdentify = Identify;
+    driver->pfnOpen = Open;
+    driver->pfnDelete = Delete;
+    return driver.release();
+}
+
+// Called while GDAL loads its plugins: nothing here may end in GDALAllRegister.
+void meshmark_shim_register()
+{
+    if (!GDAL_CHECK_VERSION(MESHMARK_DRIVER) || GDALGetDriverByName(MESHMARK_DRIVER))
+        return;
+    try
+    {
+        GetGDALDriverManager()->RegisterDriver(NewDriver());
+    }
+    catch (const std::exception &e)
+    {
+        ReportException(e.what());
+    }
+}
+
+GDALDatasetH meshmark_shim_filter(GDALDatasetH source, CSLConstList options)
+{
+    try
+    {
+        meshmark_shim_register(); // callers ask a dataset for its driver
+        MeshmarkMarking *marking = meshmark_mark(source, options);
+        if (!marking)
+            return nullptr;
+        GDALReferenceDataset(source);
+        auto dataset = new MeshmarkDataset(GDALDataset::FromHandle(source), marking);
+        dataset->SetDescription((std::string(MESHMARK_PREFIX) + GDALGetDescription(source)).c_str());
+        return GDALDataset::ToHandle(dataset);
+    }
+    catch (const std::exception &e)
+    {
+        ReportException(e.what());
+        return nullptr;
+    }
+}

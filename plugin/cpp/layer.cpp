@@ -1,0 +1,340 @@
+// A layer whose features are the source's, one at a time, with marked geometry.
+
+#include "shim.h"
+
+#include <cmath>
+#include <limits>
+
+// Between two looks at the source's files, so that a change is seen before a writer commits.
+constexpr int FEATURES_BETWEEN_CHECKS = 256;
+
+MeshmarkLayer::MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, const MeshmarkMarking *marking)
+    : m_dataset(dataset), m_source(source), m_marking(marking),
+      m_marked(source.GetLayerDefn()->GetGeomFieldCount() > 0 && meshmark_marks_layer(marking, source.GetName()))
+{
+    SetDescription(source.GetName());
+}
+
+GDALDataset *MeshmarkLayer::GetDataset()
+{
+    return &m_dataset;
+}
+
+// --- reading -------------------------------------------------------------------------------------
+
+void MeshmarkLayer::ResetReading()
+{
+    m_source.ResetReading();
+    m_ended = false;
+    m_untilCheck = 0;
+}
+
+OGRFeature *MeshmarkLayer::GetNextFeature()
+{
+    while (auto feature = ReadNext())
+    {
+        if (!PassesFilters(*feature))
+            continue;
+        DropIgnoredGeometry(*feature);
+        m_nFeaturesRead++;
+        return feature.release();
+    }
+    return nullptr;
+}
+
+// The next feature of the source, marked. After a failure there is none until the next reset.
+OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
+{
+    if (m_ended)
+        return nullptr;
+    OGRFeatureUniquePtr feature(m_source.GetNextFeature());
+    bool good = true;
+    if (!feature || m_untilCheck-- == 0)
+    {
+        good = meshmark_source_is_unchanged(m_marking);
+        m_untilCheck = FEATURES_BETWEEN_CHECKS;
+    }
+    if (feature && good && Mark(*feature))
+        return feature;
+    m_ended = true;
+    return nullptr;
+}
+
+OGRFeature *MeshmarkLayer::GetFeature(GIntBig fid)
+{
+    OGRFeatureUniquePtr feature(m_source.GetFeature(fid));
+    if (!feature || !meshmark_source_is_unchanged(m_marking) || !Mark(*feature))
+        return nullptr;
+    DropIgnoredGeometry(*feature);
+    return feature.release();
+}
+
+OGRErr MeshmarkLayer::SetNextByIndex(GIntBig index)
+{
+    if (!SourceFilters())
+        return OGRLayer::SetNextByIndex(index);
+    m_ended = false;
+    return m_source.SetNextByIndex(index);
+}
+
+bool MeshmarkLayer::Mark(OGRFeature &feature)
+{
+    for (int field = 0; m_marked && field < feature.GetGeomFieldCount(); field++)
+    {
+        if (!MarkGeometry(feature, field))
+            return false;
+    }
+    return true;
+}
+
+bool MeshmarkLayer::MarkGeometry(OGRFeature &feature, int field)
+{
+    OGRGeometry *geometry = feature.GetGeomFieldRef(field);
+    if (!geometry || geometry->IsEmpty())
+        return true;
+    m_wkb.resize(geometry->WkbSize());
+    OGRErr error = geometry->exportToWkb(wkbNDR, m_wkb.data(), wkbVariantIso);
+    if (error == OGRERR_NONE)
+    {
+        const int64_t moved = meshmark_move(m_marking, GetName(), feature.GetFID(), m_wkb.data(), m_wkb.size());
+        if (moved <= 0)
+            return moved == 0;
+        OGRGeometry *marked = nullptr;
+        error = OGRGeometryFactory::createFromWkb(m_wkb.data(), nullptr, &marked, m_wkb.size(), wkbVariantIso);
+        if (error == OGRERR_NONE)
+        {
+            marked->assignSpatialReference(geometry->getSpatialReference());
+            feature.SetGeomFieldDirectly(field, marked);
+            return true;
+        }
+    }
+    CPLError(CE_Failure, CPLE_AppDefined, "layer \"%s\", feature " CPL_FRMT_GIB ": its %s cannot be marked", GetName(),
+             feature.GetFID(), geometry->getGeometryName());
+    return false;
+}
+
+// --- filters: spatial ones see marked geometry ---------------------------------------------------
+
+bool MeshmarkLayer::PassesFilters(OGRFeature &feature)
+{
+    if (SourceFilters())
+        return true;
+    if (m_poFilterGeom && !FilterGeometry(feature.GetGeomFieldRef(m_iGeomFieldFilter)))
+        return false;
+    return !m_evaluatesGeometry || m_poAttrQuery->Evaluate(&feature);
+}
+
+#if MESHMARK_GDAL_AT_LEAST(11)
+OGRErr MeshmarkLayer::ISetSpatialFilter(int field, const OGRGeometry *geometry)
+{
+    m_iGeomFieldFilter = field;
+    InstallFilter(geometry);
+    ApplySpatialFilterToSource();
+    ResetReading();
+    return OGRERR_NONE;
+}
+#else
+void MeshmarkLayer::SetSpatialFilter(OGRGeometry *geometry)
+{
+    SetSpatialFilter(0, geometry);
+}
+
+void MeshmarkLayer::SetSpatialFilter(int field, OGRGeometry *geometry)
+{
+    if (field < 0 || (field > 0 && field >= GetLayerDefn()->GetGeomFieldCount()))
+    {
+        CPLError(CE_Failure, CPLE_AppDefined, "Invalid geometry field index : %d", field);
+        return;
+    }
+    m_iGeomFieldFilter = field;
+    InstallFilter(geometry);
+    ApplySpatialFilterToSource();
+    ResetReading();
+}
+#endif
+
+// A straight edge moves no further than its ends do, so a source's rectangle that is wider by the
+// furthest move loses no feature; PassesFilters then decides. Arcs may move further than their points.
+void MeshmarkLayer::ApplySpatialFilterToSource()
+{
+    ApplyIgnoredFieldsToSource();
+    const int field = m_iGeomFieldFilter;
+    if (!m_marked || !m_poFilterGeom)
+        m_source.SetSpatialFilter(field, m_poFilterGeom);
+    else if (!HasStraightEdges(field))
+        m_source.SetSpatialFilter(field, nullptr);
+    else
+    {
+        double x, y;
+        meshmark_reach(m_marking, &x, &y);
+        const auto &e = m_sFilterEnvelope;
+        const auto rounding = [](double a, double b)
+        { return 4 * std::numeric_limits<double>::epsilon() * (std::fabs(a) + std::fabs(b)); };
+        x += rounding(e.MinX, e.MaxX);
+        y += rounding(e.MinY, e.MaxY);
+        m_source.SetSpatialFilterRect(field, e.MinX - x, e.MinY - y, e.MaxX + x, e.MaxY + y);
+    }
+}
+
+bool MeshmarkLayer::HasStraightEdges(int field) const
+{
+    if (!m_source.TestCapability(OLCCurveGeometries))
+        return true;
+    switch (wkbFlatten(m_source.GetLayerDefn()->GetGeomFieldDefn(field)->GetType()))
+    {
+        case wkbPoint:
+        case wkbLineString:
+        case wkbPolygon:
+        case wkbMultiPoint:
+        case wkbMultiLineString:
+        case wkbMultiPolygon:
+        case wkbTriangle:
+        case wkbTIN:
+        case wkbPolyhedralSurface:
+            return true;
+        default:
+            return false;
+    }
+}
+
+// The source evaluates the filter, by its own rules and indices, unless the filter asks for geometry
+// (OGR_GEOM_AREA, OGR_GEOMETRY). It must be OGR SQL, for we could not tell that of any other language.
+OGRErr MeshmarkLayer::SetAttributeFilter(const char *query)
+{
+    m_evaluatesGeometry = false;
+    OGRErr error = OGRLayer::SetAttributeFilter(query);
+    if (error == OGRERR_NONE && m_marked)
+        m_evaluatesGeometry = AttributeFilterEvaluationNeedsGeometry();
+    const bool hand_on = error == OGRERR_NONE && !m_evaluatesGeometry;
+    const OGRErr of_source = m_source.SetAttributeFilter(hand_on ? query : nullptr);
+    ApplyIgnoredFieldsToSource();
+    ResetReading();
+    return error != OGRERR_NONE ? error : of_source;
+}
+
+// --- ignored fields ------------------------------------------------------------------------------
+
+OGRErr MeshmarkLayer::SetIgnoredFields(MeshmarkFieldNames names)
+{
+    m_ignored = CPLStringList(CSLDuplicate(const_cast<char **>(names)));
+    return ApplyIgnoredFieldsToSource();
+}
+
+// A filter needs its geometry even where the reader does not.
+OGRErr MeshmarkLayer::ApplyIgnoredFieldsToSource()
+{
+    m_ignoredButRead.clear();
+    CPLStringList ignored;
+    const OGRFeatureDefn *defn = m_source.GetLayerDefn();
+    for (int i = 0; i < m_ignored.size(); i++)
+    {
+        const int field = EQUAL(m_ignored[i], "OGR_GEOMETRY") ? 0 : defn->GetGeomFieldIndex(m_ignored[i]);
+        const bool filtered = (m_poFilterGeom && field == m_iGeomFieldFilter) || (m_evaluatesGeometry && field == 0);
+        if (m_marked && filtered)
+            m_ignoredButRead.push_back(field);
+        else
+            ignored.AddString(m_ignored[i]);
+    }
+    return m_source.SetIgnoredFields(
+        const_cast<MeshmarkFieldNames>(const_cast<const char **>(ignored.List())));
+}
+
+void MeshmarkLayer::DropIgnoredGeometry(OGRFeature &feature) const
+{
+    for (int field : m_ignoredButRead)
+        feature.SetGeomFieldDirectly(field, nullptr);
+}
+
+// --- counts and extents --------------------------------------------------------------------------
+
+GIntBig MeshmarkLayer::GetFeatureCount(int force)
+{
+    return SourceFilters() ? m_source.GetFeatureCount(force) : OGRLayer::GetFeatureCount(force);
+}
+
+#if MESHMARK_GDAL_AT_LEAST(11)
+OGRErr MeshmarkLayer::IGetExtent(int field, OGREnvelope *extent, bool force)
+{
+    return Extent(field, extent, force);
+}
+#else
+OGRErr MeshmarkLayer::GetExtent(OGREnvelope *extent, int force)
+{
+    return Extent(0, extent, force != FALSE);
+}
+
+OGRErr MeshmarkLayer::GetExtent(int field, OGREnvelope *extent, int force)
+{
+    return Extent(field, extent, force != FALSE);
+}
+#endif
+
+// Of all features, whatever the filters, as most drivers do.
+OGRErr MeshmarkLayer::Extent(int field, OGREnvelope *extent, bool force)
+{
+    if (!m_marked)
+        return m_source.GetExtent(field, extent, force);
+    *extent = OGREnvelope();
+    if (field < 0 || field >= GetLayerDefn()->GetGeomFieldCount())
+    {
+        CPLError(CE_Failure, CPLE_AppDefined, "Invalid geometry field index : %d", field);
+        return OGRERR_FAILURE;
+    }
+    if (m_extents.empty() && (!force || !MeasureExtents()))
+        return OGRERR_FAILURE;
+    *extent = m_extents[field];
+    return extent->IsInit() ? OGRERR_NONE : OGRERR_FAILURE;
+}
+
+// Reads the whole layer: the source knows only where the vertices were.
+bool MeshmarkLayer::MeasureExtents()
+{
+    const int fields = GetLayerDefn()->GetGeomFieldCount();
+    std::vector<OGREnvelope> extents(fields);
+    m_source.SetIgnoredFields(nullptr);
+    m_source.SetAttributeFilter(nullptr);
+    m_source.SetSpatialFilter(m_iGeomFieldFilter, nullptr);
+    ResetReading();
+    bool complete = true;
+    CPLErrorReset();
+    while (auto feature = ReadNext())
+    {
+        for (int field = 0; field < fields; field++)
+        {
+            const OGRGeometry *geometry = feature->GetGeomFieldRef(field);
+            if (!geometry || geometry->IsEmpty())
+                continue;
+            OGREnvelope envelope;
+            geometry->getEnvelope(&envelope);
+            extents[field].Merge(envelope);
+        }
+    }
+    complete = CPLGetLastErrorType() != CE_Failure;
+    if (m_pszAttrQueryString && !m_evaluatesGeometry)
+        m_source.SetAttributeFilter(m_pszAttrQueryString);
+    ApplySpatialFilterToSource();
+    ResetReading();
+    if (complete)
+        m_extents = std::move(extents);
+    return complete;
+}
+
+// --- capabilities --------------------------------------------------------------------------------
+
+int MeshmarkLayer::TestCapability(const char *capability) MESHMARK_CONST
+{
+    const auto is = [capability](const char *other) { return EQUAL(capability, other); };
+    if (is(OLCFastGetExtent))
+        return m_marked ? !m_extents.empty() : m_source.TestCapability(capability);
+    if (is(OLCFastSpatialFilter))
+        return (!m_marked || HasStraightEdges(m_iGeomFieldFilter)) && m_source.TestCapability(capability);
+    if (is(OLCFastFeatureCount) || is(OLCFastSetNextByIndex))
+        return SourceFilters() && m_source.TestCapability(capability);
+    for (const char *handed_on : {OLCRandomRead, OLCStringsAsUTF8, OLCIgnoreFields, OLCCurveGeometries,
+                                  OLCMeasuredGeometries, OLCZGeometries})
+    {
+        if (is(handed_on))
+            return m_source.TestCapability(capability);
+    }
+    return FALSE;
+}

@@ -1,0 +1,175 @@
+// The driver's classes, and the border between C++ and Rust.
+//
+// GDAL's C API cannot make a driver, so a dataset and a layer are subclassed here. They hand every
+// call on to the source; what concerns the mark is asked of Rust.
+
+#pragma once
+
+#include "gdal_priv.h"
+#include "ogrsf_frmts.h"
+
+#include <memory>
+#include <vector>
+
+// GDAL 3.12 made the getters const, 3.11 merged the overloads of extents and spatial filters
+// (RFC 107), 3.9 changed a parameter of SetIgnoredFields.
+#define MESHMARK_GDAL_AT_LEAST(minor) (GDAL_VERSION_NUM >= GDAL_COMPUTE_VERSION(3, minor, 0))
+#if MESHMARK_GDAL_AT_LEAST(12)
+#define MESHMARK_CONST const
+#else
+#define MESHMARK_CONST
+#endif
+#if MESHMARK_GDAL_AT_LEAST(9)
+typedef CSLConstList MeshmarkFieldNames;
+#else
+typedef const char **MeshmarkFieldNames;
+#endif
+
+constexpr const char *MESHMARK_DRIVER = "MESHMARK";
+constexpr const char *MESHMARK_PREFIX = "MESHMARK:";
+
+// --- from C++ to Rust (src/ffi.rs) ---------------------------------------------------------------
+// No function throws or unwinds. Those that can fail say so with exactly one CPLError.
+
+struct MeshmarkMarking; // what Rust knows of one marked dataset
+
+extern "C"
+{
+    // Opens the dataset `name` and marks it; nullptr on failure. The caller releases *source.
+    MeshmarkMarking *meshmark_open(const char *name, CSLConstList options, GDALDatasetH *source);
+    // Marks an open dataset; nullptr on failure. Clears the filters of its layers.
+    MeshmarkMarking *meshmark_mark(GDALDatasetH source, CSLConstList options);
+    void meshmark_free(MeshmarkMarking *);
+
+    // Whether the vertices of this layer move.
+    bool meshmark_marks_layer(const MeshmarkMarking *, const char *layer);
+    // Moves every coordinate of a geometry; how many there are, or -1 on failure.
+    int64_t meshmark_move(const MeshmarkMarking *, const char *layer, GIntBig fid, unsigned char *wkb, size_t size);
+    // The furthest any vertex moves along x and y, CRS units.
+    void meshmark_reach(const MeshmarkMarking *, double *x, double *y);
+    // False and a failure when the source's files are no longer those that were marked.
+    bool meshmark_source_is_unchanged(const MeshmarkMarking *);
+
+    // Whether writing to `name` would destroy the source of an open marked dataset.
+    bool meshmark_is_being_read(const char *name);
+    // The XML list of open options; lives as long as the process.
+    const char *meshmark_option_list();
+}
+
+struct MeshmarkFree
+{
+    void operator()(MeshmarkMarking *marking) const { meshmark_free(marking); }
+};
+
+// --- the driver ----------------------------------------------------------------------------------
+
+class MeshmarkDataset;
+
+class MeshmarkLayer final : public OGRLayer
+{
+  public:
+    MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, const MeshmarkMarking *marking);
+
+    void ResetReading() override;
+    OGRFeature *GetNextFeature() override;
+    OGRErr SetNextByIndex(GIntBig index) override;
+    OGRFeature *GetFeature(GIntBig fid) override;
+    GIntBig GetFeatureCount(int force) override;
+    int TestCapability(const char *capability) MESHMARK_CONST override;
+
+    OGRErr SetAttributeFilter(const char *query) override;
+    OGRErr SetIgnoredFields(MeshmarkFieldNames names) override;
+#if MESHMARK_GDAL_AT_LEAST(11)
+    OGRErr ISetSpatialFilter(int field, const OGRGeometry *geometry) override;
+    OGRErr IGetExtent(int field, OGREnvelope *extent, bool force) override;
+#else
+    void SetSpatialFilter(OGRGeometry *geometry) override;
+    void SetSpatialFilter(int field, OGRGeometry *geometry) override;
+    OGRErr GetExtent(OGREnvelope *extent, int force) override;
+    OGRErr GetExtent(int field, OGREnvelope *extent, int force) override;
+#endif
+
+    // Handed on as they are.
+    const char *GetName() MESHMARK_CONST override { return m_source.GetName(); }
+    OGRwkbGeometryType GetGeomType() MESHMARK_CONST override { return m_source.GetGeomType(); }
+    MESHMARK_CONST OGRFeatureDefn *GetLayerDefn() MESHMARK_CONST override { return m_source.GetLayerDefn(); }
+    MESHMARK_CONST OGRSpatialReference *GetSpatialRef() MESHMARK_CONST override { return m_source.GetSpatialRef(); }
+    const char *GetFIDColumn() MESHMARK_CONST override { return m_source.GetFIDColumn(); }
+    const char *GetGeometryColumn() MESHMARK_CONST override { return m_source.GetGeometryColumn(); }
+    int FindFieldIndex(const char *name, int exact) override { return m_source.FindFieldIndex(name, exact); }
+    OGRStyleTable *GetStyleTable() override { return m_source.GetStyleTable(); }
+    char **GetMetadata(const char *domain) override { return m_source.GetMetadata(domain); }
+    char **GetMetadataDomainList() override { return m_source.GetMetadataDomainList(); }
+    const char *GetMetadataItem(const char *name, const char *domain) override
+    {
+        return m_source.GetMetadataItem(name, domain);
+    }
+    GDALDataset *GetDataset() override;
+
+  private:
+    OGRFeatureUniquePtr ReadNext();
+    bool Mark(OGRFeature &feature);
+    bool MarkGeometry(OGRFeature &feature, int field);
+    bool PassesFilters(OGRFeature &feature);
+    void DropIgnoredGeometry(OGRFeature &feature) const;
+
+    // Whether the source alone decides which features are read, or we drop some of them.
+    bool SourceFilters() const { return !m_marked || (!m_poFilterGeom && !m_evaluatesGeometry); }
+    bool HasStraightEdges(int field) const;
+    void ApplySpatialFilterToSource();
+    OGRErr ApplyIgnoredFieldsToSource();
+    OGRErr Extent(int field, OGREnvelope *extent, bool force);
+    bool MeasureExtents();
+
+    MeshmarkDataset &m_dataset;
+    OGRLayer &m_source;
+    const MeshmarkMarking *const m_marking;
+    const bool m_marked;
+    bool m_evaluatesGeometry = false; // the attribute filter does
+    bool m_ended = false;
+    int m_untilCheck = 0;
+    CPLStringList m_ignored;                // as the user gave them
+    std::vector<int> m_ignoredButRead;      // geometry fields among them that a filter needs
+    std::vector<unsigned char> m_wkb;       // one geometry, reused
+    std::vector<OGREnvelope> m_extents;     // one a geometry field, once measured
+};
+
+class MeshmarkDataset final : public GDALDataset
+{
+  public:
+    // Takes over a reference to `source`, and `marking`.
+    MeshmarkDataset(GDALDataset *source, MeshmarkMarking *marking);
+    ~MeshmarkDataset() override;
+
+    int GetLayerCount() MESHMARK_CONST override { return static_cast<int>(m_layers.size()); }
+    MESHMARK_CONST OGRLayer *GetLayer(int index) MESHMARK_CONST override;
+    bool IsLayerPrivate(int index) const override { return m_source && m_source->IsLayerPrivate(index); }
+    int TestCapability(const char *capability) MESHMARK_CONST override;
+
+    // Handed on as they are.
+    std::vector<std::string> GetFieldDomainNames(CSLConstList options) const override;
+    const OGRFieldDomain *GetFieldDomain(const std::string &name) const override;
+    std::vector<std::string> GetRelationshipNames(CSLConstList options) const override;
+    const GDALRelationship *GetRelationship(const std::string &name) const override;
+    OGRStyleTable *GetStyleTable() override;
+    char **GetFileList() override;
+    char **GetMetadata(const char *domain) override;
+    char **GetMetadataDomainList() override;
+    const char *GetMetadataItem(const char *name, const char *domain) override;
+
+    int CloseDependentDatasets() override;
+
+  private:
+    GDALDataset *m_source;
+    std::unique_ptr<MeshmarkMarking, MeshmarkFree> m_marking;
+    std::vector<std::unique_ptr<MeshmarkLayer>> m_layers;
+};
+
+// --- from Rust to C++ ----------------------------------------------------------------------------
+// rustc hides the symbols of a C++ archive, so the public functions are Rust's and come here.
+
+extern "C"
+{
+    void meshmark_shim_register();
+    GDALDatasetH meshmark_shim_filter(GDALDatasetH source, CSLConstList options);
+}

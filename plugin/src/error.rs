@@ -1,0 +1,53 @@
+/// Why a map cannot be marked. Every message says what to do about it.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error("it is {0} already: name the dataset itself")]
+    Marked(&'static str),
+    #[error("the source is missing: write MESHMARK: and then the name of a vector dataset")]
+    NoSource,
+    #[error("the source is a raster: give a vector dataset")]
+    Raster,
+    #[error("the source cannot be opened: {0}")]
+    SourceUnopened(String),
+    #[error(
+        "the file {path} was changed, replaced or is being written since it was marked: open the map again, and \
+             write to another file than the source"
+    )]
+    SourceChanged { path: String },
+    #[error(
+        "layer \"{layer}\", feature {fid}: the coordinates ({x}, {y}) were not there when the map was marked: \
+             the source was changed while it was read, open it again"
+    )]
+    UnknownVertex { layer: String, fid: i64, x: f64, y: f64 },
+    #[error("layer \"{layer}\", feature {fid}: {reason}")]
+    Geometry { layer: String, fid: i64, reason: String },
+    #[error("option \"{0}\" is not NAME=VALUE")]
+    NotAnOption(String),
+    #[error(
+        "there is no KEY: give KEY=<file>, or the configuration option MESHMARK_KEY, with a key file made by \
+             `meshmark keygen`"
+    )]
+    NoKey,
+    #[error("the key file {path} cannot be read ({reason}): make one with `meshmark keygen`")]
+    KeyUnreadable { path: String, reason: String },
+    #[error("the key file {path} is not usable: {source}")]
+    KeyMalformed { path: String, source: meshmark_core::Error },
+    #[error("neither RECIPIENT nor MESSAGE is given: give exactly one")]
+    NoSubject,
+    #[error("RECORD={path} is the same file as the {what}: give the record a file of its own")]
+    RecordIsInput { path: String, what: &'static str },
+    #[error("RECORD={path} is there already and says something else: move it away, or give another name")]
+    RecordDiffers { path: String },
+    #[error(
+        "RECORD={path} cannot be written ({reason}): give a file in a folder that exists and can be written"
+    )]
+    RecordUnwritable { path: String, reason: String },
+    #[error("no threads can be started ({0}): set GDAL_NUM_THREADS=1")]
+    Threads(String),
+    #[error(transparent)]
+    Dataset(#[from] meshmark_dataset::Error),
+    #[error(transparent)]
+    Core(#[from] meshmark_core::Error),
+}
+
+pub type Result<T> = std::result::Result<T, Error>;

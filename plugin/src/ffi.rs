@@ -1,0 +1,210 @@
+//! The border: what GDAL and hosts call in this library, and what the C++ shim calls in Rust.
+//! `cpp/shim.h` and `include/meshmark.h` declare these functions.
+
+use crate::{
+    error::{Error, Result},
+    ffi_errors::{Collector, guarded, report, silence_panics},
+    ffi_source::{Borrowed, OwnedSource, strings, text},
+    marking::{Marking, NotMoved, Request, Source},
+    source_files::is_being_read,
+};
+use gdal_sys::{CPLErr, GDALDatasetH};
+use meshmark_core::options::option_list_xml;
+use std::{
+    ffi::{CString, c_char},
+    fmt::Display,
+    path::Path,
+    ptr, slice,
+    sync::OnceLock,
+    thread::available_parallelism,
+};
+
+type OptionList = *const *const c_char;
+
+unsafe extern "C" {
+    fn meshmark_shim_register();
+    fn meshmark_shim_filter(source: GDALDatasetH, options: OptionList) -> GDALDatasetH;
+}
+
+// --- public --------------------------------------------------------------------------------------
+
+/// GDAL calls this when it loads `ogr_MESHMARK.so`.
+#[unsafe(no_mangle)]
+pub extern "C" fn RegisterOGRMESHMARK() {
+    guarded((), || {
+        silence_panics();
+        // SAFETY: the shim's function takes no arguments and throws nothing.
+        unsafe { meshmark_shim_register() }
+    });
+}
+
+/// See `include/meshmark.h`.
+///
+/// # Safety
+/// `source` is null or an open dataset; `options` is null or an array of C strings that ends in null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn MeshmarkFilter(source: GDALDatasetH, options: OptionList) -> GDALDatasetH {
+    guarded(ptr::null_mut(), || {
+        silence_panics();
+        if source.is_null() {
+            report(CPLErr::CE_Failure, "MeshmarkFilter: the source is NULL: give an open dataset");
+            return ptr::null_mut();
+        }
+        // SAFETY: as the caller promises.
+        unsafe { meshmark_shim_filter(source, options) }
+    })
+}
+
+/// See `include/meshmark.h`.
+#[unsafe(no_mangle)]
+pub extern "C" fn MeshmarkVersion() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+// --- for the shim --------------------------------------------------------------------------------
+
+/// Opens a dataset by name and marks it; stores the handle, with a reference, in `source`.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_open(
+    name: *const c_char,
+    options: OptionList,
+    source: *mut GDALDatasetH,
+) -> *mut Marking {
+    guarded(ptr::null_mut(), || {
+        // SAFETY: the shim gives a C string, an option list and the address of a handle.
+        let (name, options, source) = unsafe { (text(name), strings(options), &mut *source) };
+        let opened = Request::new(&options, default_key_path()).and_then(|request| {
+            let opened = OwnedSource::open(&name)?;
+            // SAFETY: `opened` outlives the borrow.
+            let marking = mark(&request, &unsafe { Borrowed::new(opened.handle()) })?;
+            *source = opened.into_handle();
+            Ok(marking)
+        });
+        hand_over(&name, opened)
+    })
+}
+
+/// Marks an open dataset.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) -> *mut Marking {
+    guarded(ptr::null_mut(), || {
+        // SAFETY: the shim gives an open dataset and an option list.
+        let (source, options) = unsafe { (Borrowed::new(source), strings(options)) };
+        let marking = Request::new(&options, default_key_path()).and_then(|request| mark(&request, &source));
+        hand_over(&source.name(), marking)
+    })
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_free(marking: *mut Marking) {
+    // SAFETY: the shim frees a marking that `hand_over` gave it, once.
+    guarded((), || drop(unsafe { Box::from_raw(marking) }));
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_marks_layer(marking: *const Marking, layer: *const c_char) -> bool {
+    // SAFETY: the shim gives a marking that it holds and a C string.
+    guarded(true, || unsafe { (*marking).marks_layer(&text(layer)) })
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_move(
+    marking: *const Marking,
+    layer: *const c_char,
+    fid: i64,
+    wkb: *mut u8,
+    size: usize,
+) -> i64 {
+    guarded(-1, || {
+        // SAFETY: the shim gives a marking that it holds and a buffer of `size` bytes.
+        let (marking, wkb) = unsafe { (&*marking, slice::from_raw_parts_mut(wkb, size)) };
+        let error = match marking.move_geometry(wkb) {
+            Ok(count) => return count as i64,
+            Err(error) => error,
+        };
+        // SAFETY: the shim gives a C string.
+        let layer = unsafe { text(layer) };
+        fail(match error {
+            NotMoved::UnknownVertex([x, y]) => Error::UnknownVertex { layer, fid, x, y },
+            NotMoved::Wkb(reason) => Error::Geometry { layer, fid, reason: reason.to_string() },
+        });
+        -1
+    })
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_reach(marking: *const Marking, x: *mut f64, y: *mut f64) {
+    // SAFETY: the shim gives a marking that it holds and the addresses of two numbers.
+    guarded((), || unsafe { [*x, *y] = (*marking).reach() });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_source_is_unchanged(marking: *const Marking) -> bool {
+    // SAFETY: the shim gives a marking that it holds.
+    guarded(false, || unsafe { (*marking).check_source() }.map_err(fail).is_ok())
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_is_being_read(name: *const c_char) -> bool {
+    // SAFETY: the shim gives a C string.
+    guarded(false, || is_being_read(Path::new(&unsafe { text(name) })))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn meshmark_option_list() -> *const c_char {
+    static LIST: OnceLock<CString> = OnceLock::new();
+    guarded(c"".as_ptr(), || {
+        LIST.get_or_init(|| CString::new(option_list_xml()).expect("it has no NUL")).as_ptr()
+    })
+}
+
+// --- helpers -------------------------------------------------------------------------------------
+
+/// Marks the dataset, with GDAL's own messages collected instead of emitted: streaming will emit
+/// those that matter again.
+fn mark(request: &Request, source: &Borrowed) -> Result<Marking> {
+    if source.is_meshmark() {
+        return Err(Error::Marked("a marked view"));
+    }
+    let collector = Collector::new();
+    let files = source.watch_files();
+    let _geometry_only = source.read_geometry_only();
+    collector.clear();
+    let last_failure = || collector.first_failure();
+    Marking::new(request, Source { dataset: source, files, last_failure: &last_failure }, threads())
+}
+
+/// Gives a marking to the shim, or says why there is none.
+fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
+    match marking {
+        Ok(mut marking) => {
+            for warning in std::mem::take(&mut marking.warnings) {
+                report(CPLErr::CE_Warning, format!("MESHMARK:{name}: {warning}"));
+            }
+            Box::into_raw(Box::new(marking))
+        }
+        Err(error) => {
+            fail(format!("{name}: {error}"));
+            ptr::null_mut()
+        }
+    }
+}
+
+fn fail(message: impl Display) {
+    report(CPLErr::CE_Failure, format!("MESHMARK:{message}"));
+}
+
+fn default_key_path() -> Option<String> {
+    Some(config_option(c"MESHMARK_KEY".to_owned())).filter(|path| !path.is_empty())
+}
+
+/// GDAL_NUM_THREADS, which is ALL_CPUS or a number.
+fn threads() -> usize {
+    let all = available_parallelism().map_or(1, usize::from);
+    config_option(c"GDAL_NUM_THREADS".to_owned()).parse().map_or(all, |threads: usize| threads.clamp(1, 256))
+}
+
+fn config_option(name: CString) -> String {
+    // SAFETY: the name is a C string; the value is null or a C string.
+    unsafe { text(gdal_sys::CPLGetConfigOption(name.as_ptr(), ptr::null())) }
+}

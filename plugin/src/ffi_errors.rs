@@ -1,0 +1,124 @@
+//! GDAL's errors: ours go out once, those of what we call are collected, and panics become errors.
+
+use gdal_sys::{CPLErr, CPLErrorNum};
+use std::{
+    any::Any,
+    cell::RefCell,
+    ffi::{CStr, CString, c_char},
+    fmt::Display,
+    panic::{self, AssertUnwindSafe},
+    sync::{Mutex, PoisonError},
+};
+
+const CPLE_APP_DEFINED: CPLErrorNum = 1;
+
+/// Emits one GDAL error or warning.
+pub fn report(class: CPLErr::Type, message: impl Display) {
+    emit(class, CPLE_APP_DEFINED, &message.to_string());
+}
+
+fn emit(class: CPLErr::Type, number: CPLErrorNum, message: &str) {
+    let message = CString::new(message.replace('\0', " ")).expect("there is no NUL left");
+    // SAFETY: the format takes exactly one C string, and both outlive the call.
+    unsafe { gdal_sys::CPLError(class, number, c"%s".as_ptr(), message.as_ptr()) };
+}
+
+/// Runs `f`; a panic becomes one GDAL failure and `on_panic`. Every function that C++ calls goes
+/// through here, for unwinding into C++ would be undefined.
+pub fn guarded<T>(on_panic: T, f: impl FnOnce() -> T) -> T {
+    match panic::catch_unwind(AssertUnwindSafe(f)) {
+        Ok(value) => value,
+        Err(payload) => {
+            let reason = describe(payload.as_ref());
+            let place = take_panic_place();
+            report(CPLErr::CE_Failure, format!("MESHMARK failed inside, please report it: {reason}{place}"));
+            // A payload's own destructor may panic too; panics are rare enough to leak it.
+            std::mem::forget(payload);
+            on_panic
+        }
+    }
+}
+
+fn describe(payload: &(dyn Any + Send)) -> &str {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no reason known")
+}
+
+static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
+
+/// Keeps panics off the standard error of the host; [`guarded`] reports them. This library has a
+/// standard library of its own, so the hook concerns nobody else.
+pub fn silence_panics() {
+    panic::set_hook(Box::new(|info| {
+        let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line()));
+        *PANIC_PLACE.lock().unwrap_or_else(PoisonError::into_inner) = place;
+    }));
+}
+
+fn take_panic_place() -> String {
+    PANIC_PLACE.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
+}
+
+/// Catches the errors of the GDAL functions that are called while it lives, on this thread.
+pub struct Collector(Box<RefCell<Vec<Caught>>>);
+
+struct Caught {
+    class: CPLErr::Type,
+    number: CPLErrorNum,
+    message: String,
+}
+
+impl Collector {
+    pub fn new() -> Self {
+        let caught = Box::new(RefCell::new(Vec::new()));
+        let user_data = (&raw const *caught).cast_mut().cast();
+        // SAFETY: the box keeps its address and lives until the handler is popped in `drop`.
+        unsafe {
+            gdal_sys::CPLPushErrorHandlerEx(Some(collect), user_data);
+            gdal_sys::CPLSetCurrentErrorHandlerCatchDebug(0); // those of CPL_DEBUG go their way
+        }
+        Collector(caught)
+    }
+
+    /// The first failure since the last [`Collector::clear`].
+    pub fn first_failure(&self) -> Option<String> {
+        let caught = self.0.borrow();
+        caught.iter().find(|e| e.class == CPLErr::CE_Failure).map(|e| e.message.clone())
+    }
+
+    /// Forgets what was caught.
+    pub fn clear(&self) {
+        self.0.borrow_mut().clear();
+    }
+
+    /// Ends collecting and emits what was caught, as if nobody had collected it.
+    pub fn release(self) {
+        let caught = self.0.take();
+        drop(self);
+        for error in caught {
+            emit(error.class, error.number, &error.message);
+        }
+    }
+}
+
+impl Drop for Collector {
+    fn drop(&mut self) {
+        // SAFETY: pops the handler that `new` pushed: collectors are nested like their scopes.
+        unsafe {
+            gdal_sys::CPLPopErrorHandler();
+            gdal_sys::CPLErrorReset();
+        }
+    }
+}
+
+unsafe extern "C" fn collect(class: CPLErr::Type, number: CPLErrorNum, message: *const c_char) {
+    // SAFETY: GDAL calls handlers with a C string; the user data is that of `Collector::new`,
+    // whose box lives as long as this handler is installed.
+    unsafe {
+        let caught = &*gdal_sys::CPLGetErrorHandlerUserData().cast::<RefCell<Vec<Caught>>>();
+        if let Ok(mut caught) = caught.try_borrow_mut() {
+            let message = CStr::from_ptr(message).to_string_lossy().into_owned();
+            caught.push(Caught { class, number, message });
+        }
+    }
+}

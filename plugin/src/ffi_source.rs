@@ -1,0 +1,210 @@
+//! The source dataset, by GDAL's C API: opening, filters, ignored fields, file list.
+
+use crate::{
+    error::{Error, Result},
+    ffi_errors::Collector,
+    source_files::SourceFiles,
+};
+use gdal::{Dataset, GdalOpenFlags};
+use gdal_sys::{GDALDatasetH, OGRLayerH};
+use std::{
+    ffi::{CStr, CString, c_char},
+    mem::ManuallyDrop,
+    ops::Deref,
+    path::PathBuf,
+    ptr,
+};
+
+const PREFIX: &str = "MESHMARK:";
+const DRIVER: &CStr = c"MESHMARK";
+
+/// A dataset handle that holds one reference and gives it up when dropped.
+pub struct OwnedSource(GDALDatasetH);
+
+impl OwnedSource {
+    /// Opens a vector dataset to read. What GDAL says meanwhile is emitted only when it succeeds.
+    pub fn open(name: &str) -> Result<Self> {
+        if name.trim().is_empty() {
+            return Err(Error::NoSource);
+        }
+        if name.get(..PREFIX.len()).is_some_and(|start| start.eq_ignore_ascii_case(PREFIX)) {
+            return Err(Error::Marked("a marked view"));
+        }
+        let c_name = CString::new(name).expect("it was a C string");
+        let collector = Collector::new();
+        // Internal: the handle is ours alone, and is not to be listed among the host's datasets.
+        let flags = GdalOpenFlags::GDAL_OF_VECTOR
+            | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR
+            | GdalOpenFlags::GDAL_OF_INTERNAL;
+        // SAFETY: the name is a C string; null lists mean all drivers and no options.
+        let handle = unsafe {
+            gdal_sys::GDALOpenEx(c_name.as_ptr(), flags.bits(), ptr::null(), ptr::null(), ptr::null())
+        };
+        if handle.is_null() {
+            let reason = collector.first_failure();
+            return Err(match reason {
+                _ if is_raster(&c_name) => Error::Raster,
+                Some(reason) => Error::SourceUnopened(reason),
+                None => Error::SourceUnopened("no vector driver of GDAL knows it".into()),
+            });
+        }
+        collector.release();
+        Ok(OwnedSource(handle))
+    }
+
+    /// The handle, whose reference now is the caller's.
+    pub fn into_handle(self) -> GDALDatasetH {
+        ManuallyDrop::new(self).0
+    }
+
+    pub fn handle(&self) -> GDALDatasetH {
+        self.0
+    }
+}
+
+impl Drop for OwnedSource {
+    fn drop(&mut self) {
+        // SAFETY: the handle is open and this reference is ours.
+        unsafe { gdal_sys::GDALReleaseDataset(self.0) };
+    }
+}
+
+fn is_raster(name: &CStr) -> bool {
+    // SAFETY: the name is a C string; null lists mean all drivers and no sibling files.
+    unsafe {
+        let driver = gdal_sys::GDALIdentifyDriverEx(
+            name.as_ptr(),
+            GdalOpenFlags::GDAL_OF_RASTER.bits(),
+            ptr::null(),
+            ptr::null(),
+        );
+        !driver.is_null()
+    }
+}
+
+/// A dataset of somebody else, for the `gdal` crate: it is not closed here.
+pub struct Borrowed(ManuallyDrop<Dataset>);
+
+impl Borrowed {
+    /// # Safety
+    /// `handle` is an open dataset and stays so while this lives.
+    pub unsafe fn new(handle: GDALDatasetH) -> Self {
+        // SAFETY: the handle is open; ManuallyDrop keeps the wrapper from closing it.
+        Borrowed(ManuallyDrop::new(unsafe { Dataset::from_c_dataset(handle) }))
+    }
+
+    pub fn is_meshmark(&self) -> bool {
+        // SAFETY: the dataset is open; a dataset without a driver yields null, which no driver is.
+        unsafe {
+            let driver = gdal_sys::GDALGetDatasetDriver(self.c_dataset());
+            !driver.is_null() && driver == gdal_sys::GDALGetDriverByName(DRIVER.as_ptr())
+        }
+    }
+
+    /// The name to call it by in messages.
+    pub fn name(&self) -> String {
+        // SAFETY: the dataset is open, and its description is a C string.
+        let name = unsafe { text(gdal_sys::GDALGetDescription(self.c_dataset())) };
+        if name.is_empty() { "the dataset".into() } else { name }
+    }
+
+    /// Watches the files it is read from.
+    pub fn watch_files(&self) -> SourceFiles {
+        // SAFETY: the dataset is open; the list is ours to free.
+        unsafe {
+            let list = gdal_sys::GDALGetFileList(self.c_dataset());
+            let paths = strings(list.cast());
+            gdal_sys::CSLDestroy(list);
+            SourceFiles::watch(paths.into_iter().map(PathBuf::from))
+        }
+    }
+
+    /// Clears all filters, and leaves attributes unread until the result is dropped.
+    pub fn read_geometry_only(&self) -> GeometryOnly<'_> {
+        let layers = self.layers();
+        for &layer in &layers {
+            // SAFETY: the layers live as long as the dataset; null clears a filter.
+            unsafe {
+                gdal_sys::OGR_L_SetAttributeFilter(layer, ptr::null());
+                gdal_sys::OGR_L_SetSpatialFilter(layer, ptr::null_mut());
+                ignore_attributes(layer);
+            }
+        }
+        GeometryOnly { layers, _dataset: self }
+    }
+
+    fn layers(&self) -> Vec<OGRLayerH> {
+        // SAFETY: the dataset is open and the indices are those of its layers.
+        unsafe {
+            let count = gdal_sys::GDALDatasetGetLayerCount(self.c_dataset());
+            (0..count).map(|i| gdal_sys::GDALDatasetGetLayer(self.c_dataset(), i)).collect()
+        }
+    }
+}
+
+impl Deref for Borrowed {
+    type Target = Dataset;
+    fn deref(&self) -> &Dataset {
+        &self.0
+    }
+}
+
+/// While it lives, the layers of a dataset yield no attributes.
+pub struct GeometryOnly<'a> {
+    layers: Vec<OGRLayerH>,
+    _dataset: &'a Borrowed,
+}
+
+impl Drop for GeometryOnly<'_> {
+    fn drop(&mut self) {
+        for &layer in &self.layers {
+            // SAFETY: the layers live as long as the dataset; null reads all fields again.
+            unsafe {
+                gdal_sys::OGR_L_SetIgnoredFields(layer, ptr::null_mut());
+                gdal_sys::OGR_L_ResetReading(layer);
+            }
+        }
+    }
+}
+
+/// # Safety
+/// `layer` is a layer of an open dataset.
+unsafe fn ignore_attributes(layer: OGRLayerH) {
+    // SAFETY: the definition lives as long as the layer, the indices are those of its fields, and
+    // the list of C strings ends in null and outlives the call.
+    unsafe {
+        if gdal_sys::OGR_L_TestCapability(layer, c"IgnoreFields".as_ptr()) == 0 {
+            return;
+        }
+        let definition = gdal_sys::OGR_L_GetLayerDefn(layer);
+        let fields = 0..gdal_sys::OGR_FD_GetFieldCount(definition);
+        let name = |i| gdal_sys::OGR_Fld_GetNameRef(gdal_sys::OGR_FD_GetFieldDefn(definition, i));
+        let mut names: Vec<*const c_char> = fields.map(name).collect();
+        names.extend([c"OGR_STYLE".as_ptr(), ptr::null()]);
+        gdal_sys::OGR_L_SetIgnoredFields(layer, names.as_mut_ptr());
+    }
+}
+
+/// The strings of a GDAL list.
+///
+/// # Safety
+/// `list` is null or an array of C strings that ends in null.
+pub unsafe fn strings(list: *const *const c_char) -> Vec<String> {
+    if list.is_null() {
+        return Vec::new();
+    }
+    // SAFETY: every element before the null is a C string.
+    unsafe { (0..).map(|i| *list.add(i)).take_while(|s| !s.is_null()).map(|s| text(s)).collect() }
+}
+
+/// A C string's text; empty for null.
+///
+/// # Safety
+/// `string` is null or a C string.
+pub unsafe fn text(string: *const c_char) -> String {
+    if string.is_null() {
+        return String::new();
+    }
+    // SAFETY: it is a C string.
+    unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned()
+}

@@ -1,0 +1,208 @@
+//! A marked dataset: options → survey → embedding → record, and then one geometry after the other.
+
+use crate::{
+    error::{Error, Result},
+    record_file,
+    source_files::{SourceFiles, same_file},
+};
+use gdal::Dataset;
+use meshmark_core::{
+    embedding::{self, Marked},
+    key::SecretKey,
+    options::{Options, Subject},
+    record::{self, Record, Reference},
+    vertices::VertexTable,
+};
+use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey, wkb};
+use std::{fs::File, io::Read, path::Path};
+use zeroize::Zeroizing;
+
+/// What GDAL adds to the open options of any driver.
+const HINTS_OF_GDAL: [&str; 3] = ["NATIVE_DATA", "VALIDATE_OPEN_OPTIONS", "NOLOCK"];
+
+/// A key file has 150 bytes; a mistaken /dev/zero has no end.
+const LONGEST_KEY_FILE: u64 = 65_536;
+
+/// The options of one marking, checked as far as that is possible without the map.
+pub struct Request {
+    options: Options,
+    subject: Subject,
+    key: SecretKey,
+}
+
+impl Request {
+    /// Parses NAME=VALUE pairs and reads the key file. `default_key_path` serves when no KEY is given.
+    pub fn new(pairs: &[String], default_key_path: Option<String>) -> Result<Self> {
+        let split = |pair: &'_ String| match pair.split_once('=') {
+            Some((name, value)) => Ok((name.to_string(), value.to_string())),
+            None => Err(Error::NotAnOption(pair.clone())),
+        };
+        let pairs: Vec<(String, String)> = pairs.iter().map(split).collect::<Result<_>>()?;
+        let ours =
+            pairs.iter().filter(|(name, _)| !HINTS_OF_GDAL.iter().any(|h| h.eq_ignore_ascii_case(name)));
+        let options = Options::parse(ours.map(|(name, value)| (name.as_str(), value.as_str())))?;
+        let subject = options.subject.clone().ok_or(Error::NoSubject)?;
+        let key_path = options.key_path.clone().or(default_key_path).ok_or(Error::NoKey)?;
+        let key = read_key(&key_path)?;
+        if let Some(record) = &options.record_path {
+            record_file::check_folder(Path::new(record))?;
+            if same_file(Path::new(record), Path::new(&key_path)) {
+                return Err(Error::RecordIsInput { path: record.clone(), what: "key" });
+            }
+        }
+        Ok(Request { options, subject, key })
+    }
+}
+
+fn read_key(path: &str) -> Result<SecretKey> {
+    let unreadable = |e: std::io::Error| Error::KeyUnreadable { path: path.into(), reason: e.to_string() };
+    let mut text = Zeroizing::new(String::with_capacity(1024));
+    let file = File::open(path).map_err(unreadable)?;
+    file.take(LONGEST_KEY_FILE).read_to_string(&mut text).map_err(unreadable)?;
+    SecretKey::from_json(&text).map_err(|source| Error::KeyMalformed { path: path.into(), source })
+}
+
+/// The source's side of a marking.
+pub struct Source<'a> {
+    /// The dataset, without filters.
+    pub dataset: &'a Dataset,
+    /// The files it is made of, as they were before it was read.
+    pub files: SourceFiles,
+    /// What [`Selection::last_failure`] wants.
+    pub last_failure: &'a dyn Fn() -> Option<String>,
+}
+
+/// A marked dataset.
+pub struct Marking {
+    table: VertexTable,
+    moved: Vec<[f64; 2]>,
+    layers: Option<Vec<String>>,
+    files: SourceFiles,
+    /// Sentences the user should read though nothing failed.
+    pub warnings: Vec<String>,
+}
+
+impl Marking {
+    /// Surveys the source, computes every vertex's new place on `threads` threads and writes the record.
+    pub fn new(request: &Request, source: Source, threads: usize) -> Result<Self> {
+        let options = &request.options;
+        check_record_is_no_source(options, &source.files)?;
+        let map = survey(source.dataset, &selection(options, source.last_failure))?;
+        source.files.check()?; // what was surveyed is what was opened
+        let ground = map.ground()?;
+        let message = request.subject.message(&request.key);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| Error::Threads(error.to_string()))?;
+        let marked = pool.install(|| {
+            embedding::embed(&map.vertices, &ground, &request.key, &message, &options.parameters)
+        })?;
+        if let Some(path) = &options.record_path {
+            record_file::write(Path::new(path), &record(request, &map, &marked).to_json())?;
+        }
+        let warnings = match map.crs {
+            Some(_) => Vec::new(),
+            None => vec![
+                "the source has no CRS: its units are taken as metres; say SRS=... if they are not".into(),
+            ],
+        };
+        Ok(Marking {
+            table: map.vertices,
+            moved: marked.coords,
+            layers: options.layers.clone(),
+            files: source.files,
+            warnings,
+        })
+    }
+
+    /// Whether the vertices of this layer move.
+    pub fn marks_layer(&self, name: &str) -> bool {
+        self.layers.as_ref().is_none_or(|layers| layers.iter().any(|layer| layer == name))
+    }
+
+    /// Moves every coordinate of a WKB geometry; how many there are.
+    pub fn move_geometry(&self, bytes: &mut [u8]) -> std::result::Result<usize, NotMoved> {
+        let mut count = 0;
+        wkb::map_coordinates::<NotMoved>(bytes, &mut |point| {
+            count += 1;
+            let index = self.table.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
+            Ok(self.moved[index])
+        })?;
+        Ok(count)
+    }
+
+    /// The furthest any vertex moved along x and y, CRS units.
+    pub fn reach(&self) -> [f64; 2] {
+        let moves = self.table.coords().iter().zip(&self.moved);
+        moves.fold([0.0; 2], |reach: [f64; 2], (from, to)| {
+            [0, 1].map(|axis| reach[axis].max((to[axis] - from[axis]).abs()))
+        })
+    }
+
+    /// Fails when the source's files are not those that were marked.
+    pub fn check_source(&self) -> Result<()> {
+        self.files.check()
+    }
+}
+
+/// Why a geometry was not moved.
+pub enum NotMoved {
+    /// Its coordinate is not in the table.
+    UnknownVertex([f64; 2]),
+    /// Its bytes make no sense.
+    Wkb(wkb::WkbError),
+}
+
+impl From<wkb::WkbError> for NotMoved {
+    fn from(error: wkb::WkbError) -> Self {
+        NotMoved::Wkb(error)
+    }
+}
+
+fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<String>) -> Selection<'a> {
+    Selection {
+        layers: options.layers.as_deref(),
+        srs: options.srs.as_deref(),
+        labels: LabelFields::None,
+        target: Target::Own,
+        most_vertices: MOST_VERTICES,
+        last_failure,
+    }
+}
+
+fn check_record_is_no_source(options: &Options, files: &SourceFiles) -> Result<()> {
+    match &options.record_path {
+        Some(path) if files.contain(Path::new(path)) => {
+            Err(Error::RecordIsInput { path: path.clone(), what: "source" })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
+    let Request { options, subject, key } = request;
+    let parameters = &options.parameters;
+    Record {
+        meshmark_record: record::VERSION,
+        software: concat!("meshmark ", env!("CARGO_PKG_VERSION")).into(),
+        key_id: key.id(),
+        recipient: match subject {
+            Subject::Recipient(text) => Some(text.clone()),
+            Subject::Message(_) => None,
+        },
+        message: subject.message(key).to_hex(),
+        amplitude_m: parameters.amplitude_m,
+        chip_rate: parameters.chip_rate,
+        patch_size: parameters.patch_size,
+        tolerance_m: parameters.tolerance_m,
+        precision_crs_units: parameters.precision,
+        layers: options.layers.clone(),
+        srs: options.srs.clone(),
+        reference: Reference {
+            vertices: map.vertices.len(),
+            patches: marked.patches,
+            vertices_sha256: map.vertices.digest(),
+            crs: map.crs.as_ref().map(|crs| crs.label()),
+        },
+        displacement: marked.displacement.into(),
+    }
+}

@@ -1,0 +1,57 @@
+//! The record as a file: written whole or not at all, and never over another.
+
+use crate::error::{Error, Result};
+use std::{
+    fs::{self, Permissions},
+    io::{self, ErrorKind, Write},
+    os::unix::fs::PermissionsExt,
+    path::Path,
+};
+
+/// Whether a record could be written there, so that nobody waits for a mark first.
+pub fn check_folder(path: &Path) -> Result<()> {
+    let reason = match folder(path) {
+        folder if !folder.is_dir() => format!("{} is no folder", folder.display()),
+        _ if path.is_dir() => "it is a folder".into(),
+        _ => return Ok(()),
+    };
+    Err(Error::RecordUnwritable { path: path.display().to_string(), reason })
+}
+
+/// Writes the record. One that is there already with the same content is as good: hosts open a map
+/// more than once.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    let unwritable =
+        |e: io::Error| Error::RecordUnwritable { path: path.display().to_string(), reason: e.to_string() };
+    if is_same(path, text)? {
+        return Ok(());
+    }
+    let mut file = tempfile::Builder::new()
+        .prefix(".meshmark-record-")
+        .permissions(Permissions::from_mode(0o666)) // less the process's umask, as for any file
+        .tempfile_in(folder(path))
+        .map_err(unwritable)?;
+    file.write_all(text.as_bytes()).map_err(unwritable)?;
+    file.as_file().sync_all().map_err(unwritable)?;
+    match file.persist_noclobber(path) {
+        Ok(_) => Ok(()),
+        Err(failed) if failed.error.kind() == ErrorKind::AlreadyExists => is_same(path, text).map(|_| ()),
+        Err(failed) => Err(unwritable(failed.error)),
+    }
+}
+
+/// Whether the file is there with just this content; an error when it has another.
+fn is_same(path: &Path, text: &str) -> Result<bool> {
+    match fs::read(path) {
+        Ok(bytes) if bytes == text.as_bytes() => Ok(true),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+        _ => Err(Error::RecordDiffers { path: path.display().to_string() }),
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
