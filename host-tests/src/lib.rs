@@ -1,0 +1,3 @@
+pub mod cgal;
+pub mod delaunay_check;
+pub mod vectors;

@@ -1,0 +1,128 @@
+//! Affine maps of the plane and their fit to pairs of points.
+
+use nalgebra::{Matrix3, Matrix3x2};
+
+/// x′ = a x + b y + c, y′ = d x + e y + f.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Affine {
+    /// a, b, c, d, e, f.
+    pub coefficients: [f64; 6],
+}
+
+impl Affine {
+    /// Leaves every point where it is.
+    pub const IDENTITY: Affine = Affine { coefficients: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0] };
+
+    /// Where `p` goes.
+    pub fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [a, b, c, d, e, f] = self.coefficients;
+        [a * x + b * y + c, d * x + e * y + f]
+    }
+
+    /// The affine map that takes `from` to `to` with the least weighted sum of squares; `None` when
+    /// the points do not span a plane. `weights` has one entry for every pair.
+    pub fn fit(from: &[[f64; 2]], to: &[[f64; 2]], weights: &[f64]) -> Option<Self> {
+        let centre = weighted_mean(from, weights)?;
+        let spread = from.iter().flat_map(|p| [(p[0] - centre[0]).abs(), (p[1] - centre[1]).abs()]);
+        let scale = spread.fold(0.0, f64::max);
+        if scale == 0.0 || !scale.is_finite() {
+            return None;
+        }
+        // Centred and scaled to ±1: coordinates of 10⁷ would square the condition number away.
+        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Matrix3x2::<f64>::zeros());
+        for ((p, q), &w) in from.iter().zip(to).zip(weights) {
+            let row = [(p[0] - centre[0]) / scale, (p[1] - centre[1]) / scale, 1.0];
+            for i in 0..3 {
+                for j in 0..3 {
+                    normal[(i, j)] += w * row[i] * row[j];
+                }
+                right[(i, 0)] += w * row[i] * q[0];
+                right[(i, 1)] += w * row[i] * q[1];
+            }
+        }
+        let condition = normal.symmetric_eigenvalues();
+        if condition.min() <= 1e-12 * condition.max() {
+            return None;
+        }
+        let s = normal.cholesky()?.solve(&right);
+        let row = |axis: usize| {
+            let (a, b) = (s[(0, axis)] / scale, s[(1, axis)] / scale);
+            [a, b, s[(2, axis)] - a * centre[0] - b * centre[1]]
+        };
+        let ([a, b, c], [d, e, f]) = (row(0), row(1));
+        Some(Affine { coefficients: [a, b, c, d, e, f] })
+    }
+
+    /// The affine map with the least sum of distances, not of their squares: a few wrong pairs do
+    /// not pull it (paper, section 3.5). Iteratively reweighted least squares (Weiszfeld 1937); distances
+    /// below `least_distance` weigh alike. Distances are in the units of `to`.
+    pub fn fit_robustly(from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
+        let mut weights = vec![1.0; from.len()];
+        let mut fit = Self::fit(from, to, &weights)?;
+        for _ in 0..50 {
+            for ((w, p), q) in weights.iter_mut().zip(from).zip(to) {
+                let r = fit.apply(*p);
+                *w = 1.0 / (r[0] - q[0]).hypot(r[1] - q[1]).max(least_distance);
+            }
+            let next = Self::fit(from, to, &weights)?;
+            let change = from.iter().map(|p| {
+                let (a, b) = (fit.apply(*p), next.apply(*p));
+                (a[0] - b[0]).hypot(a[1] - b[1])
+            });
+            let settled = change.fold(0.0, f64::max) < 1e-3 * least_distance;
+            fit = next;
+            if settled {
+                break;
+            }
+        }
+        Some(fit)
+    }
+}
+
+fn weighted_mean(points: &[[f64; 2]], weights: &[f64]) -> Option<[f64; 2]> {
+    let total: f64 = weights.iter().sum();
+    let sum = |axis: usize| points.iter().zip(weights).map(|(p, w)| p[axis] * w).sum::<f64>();
+    (total > 0.0).then(|| [sum(0) / total, sum(1) / total])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHEAR: Affine = Affine { coefficients: [0.8, -0.3, 5e5, 0.1, 1.2, 6.7e6] };
+
+    fn grid() -> Vec<[f64; 2]> {
+        (0..100).map(|i| [3.8e5 + (i % 10) as f64 * 70.0, 6.6e6 + (i / 10) as f64 * 50.0]).collect()
+    }
+
+    fn worst(fit: Affine, from: &[[f64; 2]]) -> f64 {
+        let miss = |p: &[f64; 2]| {
+            let (a, b) = (fit.apply(*p), SHEAR.apply(*p));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        };
+        from.iter().map(miss).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn an_affine_map_is_recovered_at_large_coordinates() {
+        let from = grid();
+        let to: Vec<_> = from.iter().map(|p| SHEAR.apply(*p)).collect();
+        let fit = Affine::fit(&from, &to, &[1.0; 100]).unwrap();
+        assert!(worst(fit, &from) < 1e-6, "{}", worst(fit, &from));
+    }
+
+    #[test]
+    fn a_quarter_of_wrong_pairs_does_not_pull_the_robust_fit() {
+        let from = grid();
+        let mut to: Vec<_> = from.iter().map(|p| SHEAR.apply(*p)).collect();
+        (0..100).step_by(4).for_each(|i| to[i] = [to[i][0] + 300.0, to[i][1] - 40.0 * i as f64]);
+        assert!(worst(Affine::fit(&from, &to, &[1.0; 100]).unwrap(), &from) > 50.0);
+        assert!(worst(Affine::fit_robustly(&from, &to, 1e-3).unwrap(), &from) < 0.01);
+    }
+
+    #[test]
+    fn points_on_a_line_have_no_affine_fit() {
+        let line: Vec<_> = (0..10).map(|i| [i as f64, 2.0 * i as f64]).collect();
+        assert_eq!(Affine::fit(&line, &line, &[1.0; 10]), None);
+    }
+}

@@ -1,0 +1,250 @@
+//! The command line: flags in, exit code out.
+
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand};
+use meshmark_core::{
+    key::SecretKey,
+    message::Message,
+    options::{OPTIONS, Options, Subject},
+    record::Record,
+};
+use meshmark_verifier::{Demodulator, Error, ExitCode, Request, Result, progress::Progress, reading, verify};
+use std::{io::Write, path::PathBuf};
+
+/// Watermarks of vector maps: make a key, verify a suspect map.
+#[derive(Parser)]
+#[command(name = "meshmark", version, subcommand_required = true, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Subcommands,
+}
+
+#[derive(Subcommand)]
+enum Subcommands {
+    /// Make a secret key and write it to a new file that only you can read
+    Keygen {
+        /// The file to write; it must not exist
+        key_file: PathBuf,
+    },
+    /// Say whether a suspect map carries a mark
+    ///
+    /// Exit codes: 0 match, 1 no match, 2 usage, 3 inconclusive, 4 the record does not belong to this
+    /// reference or key, 5 unreadable input, 6 too large.
+    Verify(Box<VerifyArgs>),
+}
+
+#[derive(Args)]
+struct VerifyArgs {
+    /// Key file made by `meshmark keygen`
+    #[arg(long, value_name = "FILE")]
+    key: PathBuf,
+    /// The map as it was before marking
+    #[arg(long, value_name = "MAP")]
+    reference: PathBuf,
+    /// Record the driver wrote when it marked the map
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// The map in question
+    suspect: PathBuf,
+    /// Attribute field to find landmarks by; repeatable, all string and integer fields by default
+    #[arg(long, value_name = "FIELD")]
+    landmark: Vec<String>,
+    /// How to demodulate
+    #[arg(long, value_enum, default_value = "joint")]
+    demodulator: Demodulator,
+    /// Radius within which vertices match, metres on the ground
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = positive)]
+    radius: f64,
+    /// The verdict is match when the p-value is below this
+    #[arg(long, value_name = "P", default_value_t = 1e-6, value_parser = probability)]
+    significance: f64,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    marking: MarkingFlags,
+}
+
+/// The marking options as flags, from the one table.
+struct MarkingFlags(Vec<(&'static str, String)>);
+
+impl Args for MarkingFlags {
+    fn augment_args(command: Command) -> Command {
+        let flags = OPTIONS.iter().filter(|option| option.shapes_mark).map(|option| {
+            let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
+            Arg::new(option.name)
+                .long(option.name.to_lowercase().replace('_', "-"))
+                .value_name(option.name)
+                .allow_negative_numbers(true)
+                .help_heading("How the map was marked (taken from the record when there is one)")
+                .help(format!("{}{default}", option.help))
+        });
+        command.args(flags)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for MarkingFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let given = |name: &'static str| Some((name, matches.get_one::<String>(name)?.clone()));
+        let names = OPTIONS.iter().filter(|option| option.shapes_mark).map(|option| option.name);
+        Ok(MarkingFlags(names.filter_map(given).collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("give a number greater than 0".into()),
+    }
+}
+
+fn probability(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err("give a number between 0 and 1".into()),
+    }
+}
+
+/// Runs the command of this process.
+pub fn run() -> ExitCode {
+    reading::quieten_gdal();
+    let result = match Cli::parse().command {
+        Subcommands::Keygen { key_file } => keygen(&key_file),
+        Subcommands::Verify(args) => run_verify(*args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("meshmark: {error}");
+        error.exit_code()
+    })
+}
+
+fn keygen(path: &PathBuf) -> Result<ExitCode> {
+    let mut secret = zeroize::Zeroizing::new([0; 32]);
+    getrandom::fill(secret.as_mut_slice())
+        .map_err(|error| Error::Usage(format!("the operating system gives no random bytes: {error}")))?;
+    let key = SecretKey::from_bytes(*secret);
+    let failed = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::AlreadyExists => Error::Usage(format!(
+            "{} exists, and a key is never overwritten: name another file",
+            path.display()
+        )),
+        _ => Error::Usage(format!("the key file {} cannot be written: {error}", path.display())),
+    };
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.open(path).map_err(failed)?;
+    let written = file.write_all(key.to_json().as_bytes()).and_then(|()| file.sync_all());
+    if let Err(error) = written {
+        let _ = std::fs::remove_file(path); // half a key is worse than none
+        return Err(failed(error));
+    }
+    println!("key {} written to {}", key.id(), path.display());
+    Ok(ExitCode::Match)
+}
+
+fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
+    let json = args.json;
+    let request = request(args)?;
+    let mut progress = Progress::default();
+    let report = verify(&request, &mut progress)?;
+    print!("{}", if json { report.to_json() } else { report.to_text() });
+    Ok(report.exit_code())
+}
+
+/// Puts key, record and flags together.
+fn request(args: VerifyArgs) -> Result<Request> {
+    let key = reading::key(&args.key)?;
+    let record = args.record.as_deref().map(reading::record).transpose()?;
+    let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
+    let options = Options::parse(flags)?;
+    let options = match &record {
+        Some(record) => {
+            check_flags(&args.marking.0, record)?;
+            check_key(record, &key)?;
+            from_record(record)?
+        }
+        None => options,
+    };
+    let expected = options.subject.as_ref().map(|subject| subject.message(&key));
+    Ok(Request {
+        bits: expected.as_ref().map_or(128, Message::len),
+        expected,
+        key,
+        reference: args.reference,
+        suspect: args.suspect,
+        record,
+        parameters: options.parameters,
+        layers: options.layers,
+        srs: options.srs,
+        landmarks: args.landmark,
+        demodulator: args.demodulator,
+        radius_m: args.radius,
+        significance: args.significance,
+    })
+}
+
+/// The options a record was made with.
+fn from_record(record: &Record) -> Result<Options> {
+    Ok(Options {
+        key_path: None,
+        subject: Some(record.subject()?),
+        parameters: record.parameters()?,
+        layers: record.layers.clone(),
+        srs: record.srs.clone(),
+        record_path: None,
+    })
+}
+
+/// A flag may repeat what the record says, not contradict it.
+fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> {
+    let recorded = from_record(record)?;
+    for (name, value) in flags {
+        let alone = Options::parse([(*name, value.as_str())])?;
+        let agrees = match *name {
+            "RECIPIENT" => alone.subject == recorded.subject,
+            "MESSAGE" => matches!(&alone.subject, Some(Subject::Message(m)) if *m == record.message()?),
+            "AMPLITUDE" => alone.parameters.amplitude_m == recorded.parameters.amplitude_m,
+            "CHIP_RATE" => alone.parameters.chip_rate == recorded.parameters.chip_rate,
+            "PATCH_SIZE" => alone.parameters.patch_size == recorded.parameters.patch_size,
+            "TOLERANCE" => alone.parameters.tolerance_m == recorded.parameters.tolerance_m,
+            "PRECISION" => alone.parameters.precision == recorded.parameters.precision,
+            "LAYERS" => alone.layers == recorded.layers,
+            "SRS" => alone.srs == recorded.srs,
+            other => unreachable!("{other} does not shape the mark"),
+        };
+        if !agrees {
+            let flag = name.to_lowercase().replace('_', "-");
+            return Err(Error::Usage(format!(
+                "--{flag} {value} contradicts the record: leave one of them out"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The record must be of this key, and its message what key and recipient give.
+fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
+    if record.key_id != key.id() {
+        return Err(Error::DoesNotBelong(format!(
+            "the record was made with key {}, and this is key {}: give the key it was made with",
+            record.key_id,
+            key.id()
+        )));
+    }
+    if record.subject()?.message(key) != record.message()? {
+        return Err(Error::DoesNotBelong(
+            "the record's message is not that of its recipient under this key: the record was changed".into(),
+        ));
+    }
+    Ok(())
+}

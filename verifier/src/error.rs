@@ -1,0 +1,53 @@
+/// What ends a command early. Every message names the input and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error("{0}")]
+    Usage(String),
+    #[error("{0}")]
+    DoesNotBelong(String),
+    #[error("{0}")]
+    Unreadable(String),
+    #[error("{0}")]
+    TooLarge(String),
+}
+
+/// The result of every fallible function of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What the command's exit code says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExitCode {
+    /// The mark is there.
+    Match = 0,
+    /// The mark would have shown, and does not.
+    NoMatch = 1,
+    /// The command line, an option or a key or record file is wrong.
+    Usage = 2,
+    /// The suspect cannot answer the question.
+    Inconclusive = 3,
+    /// The record does not belong to this reference or this key.
+    DoesNotBelong = 4,
+    /// An input cannot be read.
+    Unreadable = 5,
+    /// An input is too large.
+    TooLarge = 6,
+}
+
+impl Error {
+    /// The exit code of this error.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Error::Usage(_) => ExitCode::Usage,
+            Error::DoesNotBelong(_) => ExitCode::DoesNotBelong,
+            Error::Unreadable(_) => ExitCode::Unreadable,
+            Error::TooLarge(_) => ExitCode::TooLarge,
+        }
+    }
+}
+
+/// An error of the algorithm is one of its parameters.
+impl From<meshmark_core::Error> for Error {
+    fn from(error: meshmark_core::Error) -> Self {
+        Error::Usage(error.to_string())
+    }
+}

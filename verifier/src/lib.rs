@@ -1,0 +1,18 @@
+//! The verifier: is this suspect a copy of that marked map?
+//!
+//! The data flows one way: [`reading`] → [`registration`] (with [`matching`]) → core's demodulation →
+//! [`decision`] → [`report`]. [`verify()`] is the whole of it.
+#![forbid(unsafe_code)]
+
+pub mod affine;
+pub mod decision;
+mod error;
+pub mod matching;
+pub mod progress;
+pub mod reading;
+pub mod registration;
+pub mod report;
+pub mod verify;
+
+pub use error::{Error, ExitCode, Result};
+pub use verify::{Demodulator, Request, verify};

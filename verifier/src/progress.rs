@@ -1,0 +1,47 @@
+//! Progress of long steps, shown on a terminal only.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::{collections::BTreeMap, time::Instant};
+
+/// Shows what is being done and remembers how long each stage took.
+pub struct Progress {
+    bar: ProgressBar,
+    stage: Option<(&'static str, Instant)>,
+    seconds: BTreeMap<&'static str, f64>,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        let bar = ProgressBar::no_length(); // draws on stderr, and nothing where that is no terminal
+        Progress { bar, stage: None, seconds: BTreeMap::new() }
+    }
+}
+
+impl Progress {
+    /// Starts a stage of `steps` steps (0: unknown) and ends the one before.
+    pub fn start(&mut self, stage: &'static str, steps: u64) {
+        self.finish();
+        self.stage = Some((stage, Instant::now()));
+        let template = if steps > 0 { "{msg} {bar:30} {pos}/{len}" } else { "{msg} {spinner}" };
+        self.bar.set_style(ProgressStyle::with_template(template).expect("a legal template"));
+        self.bar.reset();
+        self.bar.set_length(steps);
+        self.bar.set_message(stage);
+        self.bar.tick();
+    }
+
+    /// Steps done, callable from any thread.
+    pub fn stepper(&self) -> impl Fn(usize) + Sync {
+        let bar = self.bar.clone();
+        move |steps| bar.inc(steps as u64)
+    }
+
+    /// Ends the last stage and clears the line; seconds by stage.
+    pub fn finish(&mut self) -> &BTreeMap<&'static str, f64> {
+        if let Some((stage, since)) = self.stage.take() {
+            self.seconds.insert(stage, since.elapsed().as_secs_f64());
+        }
+        self.bar.finish_and_clear();
+        &self.seconds
+    }
+}

@@ -1,0 +1,171 @@
+//! Verification from files to a report.
+
+use crate::{
+    Error, Result,
+    decision::{Decision, decide},
+    matching::{Matcher, Matches},
+    progress::Progress,
+    reading::{self, Reading},
+    registration::{Side, register},
+    report::{Report, VertexCounts},
+};
+use meshmark_core::{
+    carrier::Carrier,
+    demodulation::{self, Demodulation},
+    ground::Ground,
+    key::SecretKey,
+    message::Message,
+    options::Parameters,
+    patches::Patches,
+    record::Record,
+};
+use meshmark_dataset::{LabelFields, Survey};
+use std::path::PathBuf;
+
+/// Fewer matched vertices than this are chance.
+const LEAST_MATCHED: usize = 30;
+
+/// Which of core's demodulators to use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Demodulator {
+    /// The detector of Ohbuchi, Ueda and Endoh.
+    Paper,
+    /// Least squares over the vertices that were found.
+    Joint,
+}
+
+/// What to verify, and against what.
+pub struct Request {
+    /// The secret key.
+    pub key: SecretKey,
+    /// The map before it was marked.
+    pub reference: PathBuf,
+    /// The map in question.
+    pub suspect: PathBuf,
+    /// What the driver wrote when it marked.
+    pub record: Option<Record>,
+    /// The message the suspect should carry, if it is known.
+    pub expected: Option<Message>,
+    /// Bits of the message.
+    pub bits: usize,
+    /// The numbers that shaped the mark.
+    pub parameters: Parameters,
+    /// Layers that were marked; all when `None`.
+    pub layers: Option<Vec<String>>,
+    /// CRS of the reference when it has none.
+    pub srs: Option<String>,
+    /// Attributes to use as landmarks; all when empty.
+    pub landmarks: Vec<String>,
+    /// How to demodulate.
+    pub demodulator: Demodulator,
+    /// Matching radius t, metres.
+    pub radius_m: f64,
+    /// p-values below this are a match.
+    pub significance: f64,
+}
+
+/// Verifies one suspect.
+///
+/// # Errors
+/// Unreadable input, parameters that do not fit the reference, a record of another reference.
+pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
+    let landmarks = match request.landmarks.as_slice() {
+        [] => LabelFields::All,
+        names => LabelFields::Named(names),
+    };
+    progress.start("reading", 0);
+    let reading = Reading { layers: request.layers.as_deref(), srs: request.srs.as_deref(), landmarks };
+    let reference = reading::reference(&request.reference, &reading)?;
+    check_reference(request, &reference)?;
+    let ground = reference
+        .ground()
+        .map_err(|error| Error::Usage(format!("the reference {}: {error}", request.reference.display())))?;
+    let suspect =
+        reading::suspect(&request.suspect, &Reading { layers: None, srs: None, landmarks }, &reference)?;
+
+    progress.start("patches", 0);
+    let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size)?;
+    patches.check_capacity(request.bits, request.parameters.chip_rate)?;
+
+    progress.start("registration", 0);
+    let side = |vertices, labels| Side { vertices, labels };
+    let registration = register(
+        side(&reference.vertices, &reference.labels),
+        side(&suspect.vertices, &suspect.labels),
+        &ground,
+        request.radius_m,
+    );
+
+    progress.start("matching", 0);
+    let moved = registration.apply(suspect.vertices.coords());
+    let matcher = Matcher::new(reference.vertices.coords(), &ground, reference.vertices.centre());
+    let matches = matcher.all(&moved, request.radius_m);
+    let chance = by_chance(&matcher, &moved, &ground, reference.vertices.centre(), request.radius_m);
+
+    let counts = VertexCounts {
+        reference: reference.vertices.len(),
+        suspect: suspect.vertices.len(),
+        matched: matches.count,
+    };
+    if matches.count < LEAST_MATCHED || matches.count < 2 * chance {
+        let reason = format!(
+            "{} of {} reference vertices match, no more than by chance ({chance}): the suspect was not registered",
+            matches.count,
+            reference.vertices.len()
+        );
+        let decision = Decision::inconclusive(reason);
+        return Ok(Report::new(request, &reference, registration, counts, None, decision, progress.finish()));
+    }
+
+    progress.start("demodulation", patches.as_slice().len() as u64);
+    let observed = displacements(&reference, &moved, &matches, &ground);
+    let demodulate = match request.demodulator {
+        Demodulator::Paper => demodulation::paper,
+        Demodulator::Joint => demodulation::joint,
+    };
+    let carrier = Carrier::new(&request.key);
+    let found: Demodulation =
+        demodulate(&patches, &carrier, &observed, request.bits, &request.parameters, &progress.stepper())?;
+    let decision = decide(&found, request.expected.as_ref(), request.significance);
+    Ok(Report::new(request, &reference, registration, counts, Some(&found), decision, progress.finish()))
+}
+
+/// The record must be of this very reference: the mesh of any other one differs.
+fn check_reference(request: &Request, reference: &Survey) -> Result<()> {
+    let Some(record) = &request.record else { return Ok(()) };
+    if record.reference.vertices_sha256 == reference.vertices.digest() {
+        return Ok(());
+    }
+    Err(Error::DoesNotBelong(format!(
+        "the record was made from another reference ({} vertices) than {} ({} vertices): give the file that was \
+         marked, unchanged",
+        record.reference.vertices,
+        request.reference.display(),
+        reference.vertices.len()
+    )))
+}
+
+/// How many vertices match a suspect that is certainly not in place: shifted by several radii.
+fn by_chance(
+    matcher: &Matcher,
+    moved: &[[f64; 2]],
+    ground: &Ground,
+    centre: [f64; 2],
+    radius_m: f64,
+) -> usize {
+    let unit = ground.metres_per_unit(centre);
+    let shift = [7.3 * radius_m / unit[0].max(f64::MIN_POSITIVE), -5.1 * radius_m / unit[1]];
+    let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + shift[0], p[1] + shift[1]]).collect();
+    matcher.all(&shifted, radius_m).count
+}
+
+/// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
+fn displacements(
+    reference: &Survey,
+    moved: &[[f64; 2]],
+    matches: &Matches,
+    ground: &Ground,
+) -> Vec<Option<[f64; 2]>> {
+    let pairs = reference.vertices.coords().iter().zip(&matches.suspect_of);
+    pairs.map(|(r, s)| s.map(|s| ground.metres_between(*r, moved[s as usize]))).collect()
+}
