@@ -23,21 +23,13 @@ static int Identify(GDALOpenInfo *info)
            (info->nOpenFlags == 0 && meshmark_is_being_read(info->pszFilename));
 }
 
-static void RefuseToWrite(const char *name)
-{
-    CPLError(CE_Failure, CPLE_AppDefined,
-             "%s is being read through MESHMARK and cannot be written at the same time: write the "
-             "marked map to another file",
-             name);
-}
-
 static GDALDataset *Open(GDALOpenInfo *info)
 {
     const char *name = info->pszFilename;
     if (!HasPrefix(name))
     {
         if (info->eAccess == GA_Update && meshmark_is_being_read(name))
-            RefuseToWrite(name);
+            meshmark_refuse_to_write(name, false);
         return nullptr;
     }
     if (info->eAccess == GA_Update)
@@ -65,7 +57,7 @@ static CPLErr Delete(const char *name)
     if (HasPrefix(name))
         CPLError(CE_Failure, CPLE_NotSupported, "%s is a view of a dataset: delete the dataset itself", name);
     else
-        RefuseToWrite(name);
+        meshmark_refuse_to_write(name, true); // some writers go on and truncate the file
     return CE_Failure;
 }
 

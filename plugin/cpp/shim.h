@@ -52,6 +52,8 @@ extern "C"
 
     // Whether writing to `name` would destroy the source of an open marked dataset.
     bool meshmark_is_being_read(const char *name);
+    // Says that it is being read, and first saves a copy if something may write to it all the same.
+    void meshmark_refuse_to_write(const char *name, bool copy_first);
     // The XML list of open options; lives as long as the process.
     const char *meshmark_option_list();
 }

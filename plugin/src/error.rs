@@ -10,13 +10,23 @@ pub enum Error {
     #[error("the source cannot be opened: {0}")]
     SourceUnopened(String),
     #[error(
-        "the file {path} was changed, replaced or is being written since it was marked: open the map again, and \
-             write to another file than the source"
+        "its file {path} was changed, or is being written, since it was marked: open the map again, and \
+         write to another file than the source"
     )]
     SourceChanged { path: String },
     #[error(
+        "its file {path} was overwritten while it was read; what it was is saved in {copies}: move that back, and \
+         write the marked map to another file"
+    )]
+    SourceOverwritten { path: String, copies: String },
+    #[error(
+        "it is being read through MESHMARK and cannot be written at the same time{unsaved}: write the marked map to \
+         another file"
+    )]
+    BeingRead { unsaved: String },
+    #[error(
         "layer \"{layer}\", feature {fid}: the coordinates ({x}, {y}) were not there when the map was marked: \
-             the source was changed while it was read, open it again"
+         the source was changed while it was read, open it again"
     )]
     UnknownVertex { layer: String, fid: i64, x: f64, y: f64 },
     #[error("layer \"{layer}\", feature {fid}: {reason}")]
@@ -25,7 +35,7 @@ pub enum Error {
     NotAnOption(String),
     #[error(
         "there is no KEY: give KEY=<file>, or the configuration option MESHMARK_KEY, with a key file made by \
-             `meshmark keygen`"
+         `meshmark keygen`"
     )]
     NoKey,
     #[error("the key file {path} cannot be read ({reason}): make one with `meshmark keygen`")]

@@ -6,13 +6,12 @@ use crate::{
     ffi_errors::{Collector, guarded, report, silence_panics},
     ffi_source::{Borrowed, OwnedSource, strings, text},
     marking::{Marking, NotMoved, Request, Source},
-    source_files::is_being_read,
+    source_files::{is_being_read, save_copies},
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::option_list_xml;
 use std::{
     ffi::{CString, c_char},
-    fmt::Display,
     path::Path,
     ptr, slice,
     sync::OnceLock,
@@ -76,7 +75,7 @@ unsafe extern "C" fn meshmark_open(
         let opened = Request::new(&options, default_key_path()).and_then(|request| {
             let opened = OwnedSource::open(&name)?;
             // SAFETY: `opened` outlives the borrow.
-            let marking = mark(&request, &unsafe { Borrowed::new(opened.handle()) })?;
+            let marking = mark(name.clone(), &request, &unsafe { Borrowed::new(opened.handle()) })?;
             *source = opened.into_handle();
             Ok(marking)
         });
@@ -90,8 +89,9 @@ unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) ->
     guarded(ptr::null_mut(), || {
         // SAFETY: the shim gives an open dataset and an option list.
         let (source, options) = unsafe { (Borrowed::new(source), strings(options)) };
-        let marking = Request::new(&options, default_key_path()).and_then(|request| mark(&request, &source));
-        hand_over(&source.name(), marking)
+        let request = Request::new(&options, default_key_path());
+        let name = source.name();
+        hand_over(&name, request.and_then(|request| mark(name.clone(), &request, &source)))
     })
 }
 
@@ -124,10 +124,11 @@ unsafe extern "C" fn meshmark_move(
         };
         // SAFETY: the shim gives a C string.
         let layer = unsafe { text(layer) };
-        fail(match error {
+        let error = match error {
             NotMoved::UnknownVertex([x, y]) => Error::UnknownVertex { layer, fid, x, y },
             NotMoved::Wkb(reason) => Error::Geometry { layer, fid, reason: reason.to_string() },
-        });
+        };
+        fail(&marking.name, &error);
         -1
     })
 }
@@ -140,14 +141,31 @@ unsafe extern "C" fn meshmark_reach(marking: *const Marking, x: *mut f64, y: *mu
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_source_is_unchanged(marking: *const Marking) -> bool {
-    // SAFETY: the shim gives a marking that it holds.
-    guarded(false, || unsafe { (*marking).check_source() }.map_err(fail).is_ok())
+    guarded(false, || {
+        // SAFETY: the shim gives a marking that it holds.
+        let marking = unsafe { &*marking };
+        marking.check_source().map_err(|error| fail(&marking.name, &error)).is_ok()
+    })
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_is_being_read(name: *const c_char) -> bool {
     // SAFETY: the shim gives a C string.
     guarded(false, || is_being_read(Path::new(&unsafe { text(name) })))
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_refuse_to_write(name: *const c_char, copy_first: bool) {
+    guarded((), || {
+        // SAFETY: the shim gives a C string.
+        let name = unsafe { text(name) };
+        let saved = if copy_first { save_copies(Path::new(&name)) } else { Ok(()) };
+        let unsaved = saved.map_err(|error| format!(" (nor could a copy be saved: {error})"));
+        report(
+            CPLErr::CE_Failure,
+            format!("{name}: {}", Error::BeingRead { unsaved: unsaved.err().unwrap_or_default() }),
+        );
+    });
 }
 
 #[unsafe(no_mangle)]
@@ -162,7 +180,7 @@ extern "C" fn meshmark_option_list() -> *const c_char {
 
 /// Marks the dataset, with GDAL's own messages collected instead of emitted: streaming will emit
 /// those that matter again.
-fn mark(request: &Request, source: &Borrowed) -> Result<Marking> {
+fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
     }
@@ -171,7 +189,7 @@ fn mark(request: &Request, source: &Borrowed) -> Result<Marking> {
     let _geometry_only = source.read_geometry_only();
     collector.clear();
     let last_failure = || collector.first_failure();
-    Marking::new(request, Source { dataset: source, files, last_failure: &last_failure }, threads())
+    Marking::new(request, Source { name, dataset: source, files, last_failure: &last_failure }, threads())
 }
 
 /// Gives a marking to the shim, or says why there is none.
@@ -184,14 +202,14 @@ fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
             Box::into_raw(Box::new(marking))
         }
         Err(error) => {
-            fail(format!("{name}: {error}"));
+            fail(name, &error);
             ptr::null_mut()
         }
     }
 }
 
-fn fail(message: impl Display) {
-    report(CPLErr::CE_Failure, format!("MESHMARK:{message}"));
+fn fail(name: &str, error: &Error) {
+    report(CPLErr::CE_Failure, format!("MESHMARK:{name}: {error}"));
 }
 
 fn default_key_path() -> Option<String> {

@@ -64,6 +64,8 @@ fn read_key(path: &str) -> Result<SecretKey> {
 
 /// The source's side of a marking.
 pub struct Source<'a> {
+    /// What to call it in messages.
+    pub name: String,
     /// The dataset, without filters.
     pub dataset: &'a Dataset,
     /// The files it is made of, as they were before it was read.
@@ -74,6 +76,8 @@ pub struct Source<'a> {
 
 /// A marked dataset.
 pub struct Marking {
+    /// What to call the source in messages.
+    pub name: String,
     table: VertexTable,
     moved: Vec<[f64; 2]>,
     layers: Option<Vec<String>>,
@@ -106,6 +110,7 @@ impl Marking {
             ],
         };
         Ok(Marking {
+            name: source.name,
             table: map.vertices,
             moved: marked.coords,
             layers: options.layers.clone(),

@@ -1,8 +1,14 @@
-//! The files a marked dataset is read from: nobody may write to them meanwhile, least of all us.
+//! The files a marked dataset is read from: nobody may write to them meanwhile.
+//!
+//! `ogr2ogr map.gpkg MESHMARK:map.gpkg` must not cost anybody their map. Before a writer of GDAL makes
+//! a file it deletes what bears its name, and before it appends it opens that for update; the driver
+//! sees both and refuses them ([`is_being_read`]). Most writers then give up. Some truncate the file
+//! all the same: for them it is copied first ([`save_copies`]).
 
 use crate::error::{Error, Result};
 use std::{
-    fs::{self, Metadata},
+    fs::{self, File, Metadata},
+    io,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
     sync::{
@@ -20,9 +26,10 @@ static NEXT_NUMBER: AtomicU64 = AtomicU64::new(0);
 
 struct OpenSource {
     number: u64,
-    files: Vec<FileId>,
+    files: Vec<(PathBuf, FileId)>,
     /// The folders of a dataset of several files: GDAL can open the folder in its place.
     folders: Vec<FileId>,
+    copies: Vec<PathBuf>,
 }
 
 /// The files of one dataset.
@@ -60,11 +67,8 @@ impl SourceFiles {
             0 | 1 => Vec::new(),
             _ => files.iter().filter_map(|file| FileId::of(file.path.parent()?)).collect(),
         };
-        open_sources().push(OpenSource {
-            number,
-            files: files.iter().map(|file| file.state.id).collect(),
-            folders,
-        });
+        let ids = files.iter().map(|file| (file.path.clone(), file.state.id)).collect();
+        open_sources().push(OpenSource { number, files: ids, folders, copies: Vec::new() });
         SourceFiles { number, files }
     }
 
@@ -75,16 +79,28 @@ impl SourceFiles {
 
     /// Fails when a file is not what it was, or when a transaction on it is under way.
     pub fn check(&self) -> Result<()> {
-        match self.files.iter().find(|file| !file.is_unchanged()) {
-            Some(file) => Err(Error::SourceChanged { path: file.path.display().to_string() }),
-            None => Ok(()),
+        let Some(file) = self.files.iter().find(|file| !file.is_unchanged()) else { return Ok(()) };
+        let path = file.path.display().to_string();
+        let open = open_sources();
+        let copies =
+            open.iter().filter(|source| source.number == self.number).flat_map(|source| &source.copies);
+        let copies: Vec<String> = copies.map(|copy| copy.display().to_string()).collect();
+        match copies.is_empty() {
+            true => Err(Error::SourceChanged { path }),
+            false => Err(Error::SourceOverwritten { path, copies: copies.join(", ") }),
         }
     }
 }
 
 impl Drop for SourceFiles {
     fn drop(&mut self) {
-        open_sources().retain(|source| source.number != self.number);
+        let unchanged = self.check().is_ok();
+        let mut open = open_sources();
+        let Some(at) = open.iter().position(|source| source.number == self.number) else { return };
+        let copies = open.swap_remove(at).copies;
+        if unchanged {
+            copies.iter().for_each(|copy| drop(fs::remove_file(copy))); // nothing was lost, they may go
+        }
     }
 }
 
@@ -129,15 +145,50 @@ pub fn is_being_read(path: &Path) -> bool {
         return false;
     }
     let Some(id) = FileId::of(path) else { return false };
-    sources.iter().any(|source| source.files.contains(&id) || source.folders.contains(&id))
+    sources.iter().any(|source| source.is_written_by(id))
+}
+
+/// Copies the files of the open source that is about to be overwritten at `path`. The copies stay only
+/// if it comes to that.
+pub fn save_copies(path: &Path) -> io::Result<()> {
+    let Some(id) = FileId::of(path) else { return Ok(()) };
+    let mut open = open_sources();
+    for source in open.iter_mut().filter(|source| source.copies.is_empty() && source.is_written_by(id)) {
+        for (file, _) in &source.files {
+            let (copy, mut to) = create_copy_file(file)?;
+            source.copies.push(copy);
+            io::copy(&mut File::open(file)?, &mut to)?;
+        }
+    }
+    Ok(())
+}
+
+/// `map.kml.saved`, or with a number when one is there from another accident.
+fn create_copy_file(file: &Path) -> io::Result<(PathBuf, File)> {
+    let names = std::iter::once(".saved".to_string()).chain((2..100).map(|i| format!(".saved{i}")));
+    for name in names.map(|suffix| with_suffix(file, &suffix)) {
+        match File::create_new(&name) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            created => return created.map(|to| (name, to)),
+        }
+    }
+    Err(io::ErrorKind::AlreadyExists.into())
+}
+
+impl OpenSource {
+    fn is_written_by(&self, id: FileId) -> bool {
+        self.folders.contains(&id) || self.files.iter().any(|(_, file)| *file == id)
+    }
 }
 
 fn sidecar_lengths(path: &Path) -> [u64; 2] {
-    SIDECARS.map(|suffix| {
-        let mut sidecar = path.as_os_str().to_owned();
-        sidecar.push(suffix);
-        fs::metadata(sidecar).map_or(0, |metadata| metadata.len())
-    })
+    SIDECARS.map(|suffix| fs::metadata(with_suffix(path, suffix)).map_or(0, |metadata| metadata.len()))
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
 }
 
 fn open_sources() -> MutexGuard<'static, Vec<OpenSource>> {
