@@ -197,19 +197,39 @@ bool MeshmarkLayer::HasStraightEdges(int field) const
     }
 }
 
-// The source evaluates the filter, by its own rules and indices, unless the filter asks for geometry
-// (OGR_GEOM_AREA, OGR_GEOMETRY). It must be OGR SQL, for we could not tell that of any other language.
+// The source evaluates the filter, in its own language and with its own indices, unless the filter
+// asks for geometry (OGR_GEOM_AREA, OGR_GEOMETRY): that one must be OGR SQL, which we can evaluate.
 OGRErr MeshmarkLayer::SetAttributeFilter(const char *query)
 {
-    m_evaluatesGeometry = false;
-    OGRErr error = OGRLayer::SetAttributeFilter(query);
-    if (error == OGRERR_NONE && m_marked)
-        m_evaluatesGeometry = AttributeFilterEvaluationNeedsGeometry();
-    const bool hand_on = error == OGRERR_NONE && !m_evaluatesGeometry;
-    const OGRErr of_source = m_source.SetAttributeFilter(hand_on ? query : nullptr);
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    const bool is_ogr_sql = OGRLayer::SetAttributeFilter(query) == OGRERR_NONE;
+    CPLPopErrorHandler();
+    CPLErrorReset();
+    m_evaluatesGeometry = m_marked && is_ogr_sql && AttributeFilterEvaluationNeedsGeometry();
+
+    const bool refused = m_marked && !is_ogr_sql && NamesGeometry(query);
+    if (refused)
+        CPLError(CE_Failure, CPLE_NotSupported, "the filter %s asks for geometry: write it in OGR SQL, so that it sees "
+                 "the marked one", query);
+    const bool hand_on = !m_evaluatesGeometry && !refused;
+    const OGRErr error = m_source.SetAttributeFilter(hand_on ? query : nullptr);
+    if (refused || error != OGRERR_NONE)
+        OGRLayer::SetAttributeFilter(nullptr);
     ApplyIgnoredFieldsToSource();
     ResetReading();
-    return error != OGRERR_NONE ? error : of_source;
+    return refused ? OGRERR_FAILURE : error;
+}
+
+bool MeshmarkLayer::NamesGeometry(const char *query) const
+{
+    OGRFeatureDefn *defn = m_source.GetLayerDefn();
+    for (int i = 0; i < defn->GetGeomFieldCount(); i++)
+    {
+        const char *name = defn->GetGeomFieldDefn(i)->GetNameRef();
+        if (*name && CPLString(query).ifind(name) != std::string::npos)
+            return true;
+    }
+    return false;
 }
 
 // --- ignored fields ------------------------------------------------------------------------------

@@ -118,6 +118,7 @@ class MeshmarkLayer final : public OGRLayer
     // Whether the source alone decides which features are read, or we drop some of them.
     bool SourceFilters() const { return !m_marked || (!m_poFilterGeom && !m_evaluatesGeometry); }
     bool HasStraightEdges(int field) const;
+    bool NamesGeometry(const char *query) const;
     void ApplySpatialFilterToSource();
     OGRErr ApplyIgnoredFieldsToSource();
     OGRErr Extent(int field, OGREnvelope *extent, bool force);
