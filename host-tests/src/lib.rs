@@ -1,3 +1,4 @@
+pub mod attacks;
 pub mod cgal;
 pub mod delaunay_check;
 pub mod vectors;

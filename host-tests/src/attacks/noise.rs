@@ -1,0 +1,61 @@
+//! Noise and rounding.
+
+use super::{Map, Result, random::PerVertex};
+
+/// Adds uniform noise to both coordinates of every vertex, units of the CRS.
+///
+/// # Errors
+/// Coordinates that are not finite.
+pub fn add(map: &Map, half_width: f64, seed: u64) -> Result<Map> {
+    let noise =
+        PerVertex::draw(map, seed, |random| [random.symmetric(half_width), random.symmetric(half_width)])?;
+    Ok(map.map_coords(|vertex| {
+        let [dx, dy] = noise.at(vertex);
+        [vertex[0] + dx, vertex[1] + dy]
+    }))
+}
+
+/// Puts every vertex on the nearest node of a grid through the origin.
+pub fn snap(map: &Map, spacing: f64) -> Map {
+    // Nodes of a spacing such as 0.1 are k / 10, the numbers that print as one decimal; k × 0.1 are not.
+    let per_unit = 1.0 / spacing;
+    let whole = (per_unit - per_unit.round()).abs() < 1e-9;
+    let node = |value: f64| match whole {
+        true => (value * per_unit.round()).round() / per_unit.round(),
+        false => (value / spacing).round() * spacing,
+    };
+    map.map_coords(|vertex| vertex.map(node))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attacks::tests::{assert_shared_vertices_stay_shared, fixture, in_memory, pairs, wkt};
+
+    #[test]
+    fn noise_fills_its_square_and_a_seed_repeats_it() {
+        let map = fixture("kotka.gpkg");
+        let noisy = add(&map, 0.3, 5).unwrap();
+        let moved: Vec<[f64; 2]> = pairs(&map, &noisy).map(|(a, b)| [b[0] - a[0], b[1] - a[1]]).collect();
+        let most = moved.iter().flatten().fold(0f64, |a, b| a.max(b.abs()));
+        assert!(most <= 0.3 + 1e-8 && most > 0.299, "{most}");
+        let mean_square = moved.iter().flatten().map(|d| d * d).sum::<f64>() / (2 * moved.len()) as f64;
+        assert!((mean_square - 0.03).abs() < 0.002, "variance of a uniform distribution: {mean_square}");
+        assert_eq!(noisy, add(&map, 0.3, 5).unwrap());
+        assert_ne!(noisy, add(&map, 0.3, 6).unwrap());
+    }
+
+    #[test]
+    fn shared_walls_stay_shared() {
+        let map = fixture("helsinki.gpkg");
+        assert_shared_vertices_stay_shared(&map, &add(&map, 0.5, 1).unwrap());
+    }
+
+    #[test]
+    fn snapped_coordinates_print_as_the_decimals_they_are() {
+        let map = in_memory(&["LINESTRING (0.26 0.34,385418.2914 6671463.552)"]);
+        assert_eq!(wkt(&snap(&map, 0.1)), ["LINESTRING (0.3 0.3,385418.3 6671463.6)"]);
+        assert_eq!(wkt(&snap(&map, 0.25)), ["LINESTRING (0.25 0.25,385418.25 6671463.5)"]);
+        assert_eq!(wkt(&snap(&map, 3.0)), ["LINESTRING (0 0,385419 6671463)"]);
+    }
+}
