@@ -1,10 +1,10 @@
 //! Reading: key, record, reference and suspect, with errors that name the file.
 
 use crate::{Error, Result};
-use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
+use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
-use std::{path::Path, sync::Mutex};
+use std::{collections::BTreeSet, path::Path, sync::Mutex};
 
 /// What a suspect may be: local files of plain formats. No format that points at other data (VRT,
 /// SQL, network), for a suspect may be made to mislead; and not MESHMARK.
@@ -70,7 +70,21 @@ pub struct Reading<'a> {
 /// Reads the reference: any vector dataset GDAL opens.
 pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     let dataset = open("reference", path, None)?;
+    if let LabelFields::Named(names) = reading.landmarks {
+        check_fields(path, &dataset, names)?;
+    }
     read("reference", path, &dataset, reading, Target::Own)
+}
+
+/// A misspelt field would leave no landmark, and nobody would know why.
+fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> {
+    let fields_of = |layer: gdal::vector::Layer| layer.defn().fields().map(|f| f.name()).collect::<Vec<_>>();
+    let known: BTreeSet<String> = dataset.layers().flat_map(fields_of).collect();
+    let unknown = names.iter().find(|name| !known.iter().any(|field| field.eq_ignore_ascii_case(name)));
+    let Some(name) = unknown else { return Ok(()) };
+    let known = known.into_iter().collect::<Vec<_>>().join(", ");
+    let path = path.display();
+    Err(Error::Usage(format!("the reference {path} has no field \"{name}\": --landmark may name {known}")))
 }
 
 /// Reads the suspect in the CRS of the reference, where both are known.
