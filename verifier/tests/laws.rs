@@ -1,0 +1,157 @@
+//! What a verdict rests on: the message survives any affine map, and nobody else is accused.
+
+use meshmark_core::{
+    carrier::Carrier,
+    demodulation::{self, Demodulation},
+    embedding::embed,
+    ground::Ground,
+    key::SecretKey,
+    message::Message,
+    options::Parameters,
+    patches::Patches,
+    vertices::VertexTable,
+};
+use meshmark_dataset::{Dimension, Label, LabelFields, MOST_VERTICES, Selection, Target, survey};
+use meshmark_verifier::{
+    affine::Affine,
+    decision::{Decision, Verdict, decide},
+    matching::Matcher,
+    registration::{Side, register},
+};
+use proptest::prelude::*;
+
+/// A marked map with labels on every twentieth vertex.
+struct Case {
+    reference: VertexTable,
+    ground: Ground,
+    key: SecretKey,
+    marked: Vec<[f64; 2]>,
+}
+
+impl Case {
+    /// fixtures/kotka.gpkg, marked for ACME GmbH.
+    fn kotka() -> Self {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/kotka.gpkg");
+        let selection = Selection {
+            layers: None,
+            srs: None,
+            labels: LabelFields::None,
+            target: Target::Own,
+            most_vertices: MOST_VERTICES,
+            last_failure: &|| None,
+        };
+        let map = survey(&gdal::Dataset::open(path).unwrap(), &selection).unwrap();
+        let (ground, key) = (map.ground().unwrap(), SecretKey::from_bytes([7; 32]));
+        let message = key.recipient_message("ACME GmbH");
+        let marked = embed(&map.vertices, &ground, &key, &message, &Parameters::default()).unwrap();
+        Case { reference: map.vertices, ground, key, marked: marked.coords }
+    }
+
+    fn labels(&self, coords: &[[f64; 2]]) -> Vec<Label> {
+        let label = |(i, p): (usize, &[f64; 2])| Label {
+            value: format!("building {i}"),
+            point: *p,
+            dimension: Dimension::Area,
+        };
+        coords.iter().enumerate().step_by(20).map(label).collect()
+    }
+
+    /// Registers, matches and demodulates a suspect whose vertices are `moved`, in canonical order of
+    /// the reference, under a key.
+    fn demodulate(&self, moved: &[[f64; 2]], key: &SecretKey) -> Demodulation {
+        let suspect = VertexTable::new(moved.to_vec()).unwrap();
+        let found = register(
+            Side { vertices: &self.reference, labels: &self.labels(self.reference.coords()) },
+            Side { vertices: &suspect, labels: &self.labels(moved) },
+            &self.ground,
+            1.0,
+        );
+        let coords = found.apply(suspect.coords());
+        let centre = self.reference.centre();
+        let matches = Matcher::new(self.reference.coords(), &self.ground, centre).all(&coords, 1.0);
+        let pairs = self.reference.coords().iter().zip(&matches.suspect_of);
+        let metres =
+            |(r, s): (&[f64; 2], &Option<u32>)| s.map(|s| self.ground.metres_between(*r, coords[s as usize]));
+        let observed: Vec<_> = pairs.map(metres).collect();
+        let parameters = Parameters::default();
+        let patches = Patches::new(&self.reference, &self.ground, parameters.patch_size).unwrap();
+        demodulation::joint(&patches, &Carrier::new(key), &observed, 128, &parameters, &|_| ()).unwrap()
+    }
+
+    fn decide(&self, found: &Demodulation, message: &Message) -> Decision {
+        decide(found, Some(message), 1e-6)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn the_message_comes_back_under_any_affine_map(
+        turn in 0.0..std::f64::consts::TAU,
+        scales in (0.2..5.0f64, 0.2..5.0f64),
+        shear in -0.5..0.5f64,
+        mirrored: bool,
+        shift in (-1e6..1e6f64, -1e6..1e6f64),
+    ) {
+        let case = Case::kotka();
+        let (sin, cos) = turn.sin_cos();
+        let flip = if mirrored { -1.0 } else { 1.0 };
+        let affine = Affine { coefficients: [
+            flip * scales.0 * cos, -scales.1 * sin + shear * cos, shift.0,
+            flip * scales.0 * sin, scales.1 * cos + shear * sin, shift.1,
+        ]};
+        let moved: Vec<[f64; 2]> = case.marked.iter().map(|p| affine.apply(*p)).collect();
+        let message = case.key.recipient_message("ACME GmbH");
+        let found = case.demodulate(&moved, &case.key);
+        prop_assert_eq!(found.message(), message.clone());
+        prop_assert_eq!(case.decide(&found, &message).verdict, Verdict::Match);
+    }
+}
+
+#[test]
+fn of_a_thousand_other_recipients_of_the_same_key_none_is_accused() {
+    let case = Case::kotka();
+    let found = case.demodulate(&case.marked, &case.key);
+    assert_eq!(case.decide(&found, &case.key.recipient_message("ACME GmbH")).verdict, Verdict::Match);
+    let others = (0..1000).map(|i| case.key.recipient_message(&format!("recipient {i}")));
+    let accused = others.filter(|message| case.decide(&found, message).verdict != Verdict::NoMatch);
+    assert_eq!(accused.count(), 0);
+}
+
+#[test]
+fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
+    let case = Case::kotka();
+    let patches = Patches::new(&case.reference, &case.ground, 480).unwrap();
+    let pairs = case.reference.coords().iter().zip(&case.marked);
+    let observed: Vec<_> = pairs.map(|(r, s)| Some(case.ground.metres_between(*r, *s))).collect();
+    let p_mark = |seed: u8| {
+        let key = SecretKey::from_bytes([seed; 32]);
+        let found = demodulation::paper(
+            &patches,
+            &Carrier::new(&key),
+            &observed,
+            128,
+            &Parameters::default(),
+            &|_| (),
+        )
+        .unwrap();
+        let decision = case.decide(&found, &key.recipient_message("ACME GmbH"));
+        assert_eq!(decision.verdict, Verdict::NoMatch);
+        10f64.powf(decision.p_mark_log10.unwrap())
+    };
+    let mut p: Vec<f64> = (100..140).map(p_mark).collect();
+    p.sort_by(f64::total_cmp);
+    // Kolmogorov-Smirnov distance to the uniform distribution; 0.301 is exceeded once in a thousand.
+    let step = |(i, p): (usize, &f64)| (p - i as f64 / 40.0).abs().max((p - (i + 1) as f64 / 40.0).abs());
+    let distance = p.iter().enumerate().map(step).fold(0.0, f64::max);
+    assert!(distance < 0.301, "{distance}");
+}
+
+#[test]
+fn an_unmarked_map_is_no_match() {
+    let case = Case::kotka();
+    let found = case.demodulate(case.reference.coords(), &case.key);
+    let decision = case.decide(&found, &case.key.recipient_message("ACME GmbH"));
+    assert_eq!(decision.verdict, Verdict::NoMatch);
+}
