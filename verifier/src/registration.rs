@@ -60,7 +60,7 @@ pub fn register(reference: Side, suspect: Side, ground: &Ground, radius_m: f64) 
         return identity.0;
     }
     let pairs = pairs(reference.labels, suspect.labels);
-    let starts = search.from_landmarks(&pairs);
+    let starts = search.landmark_starts(&pairs);
     let found = starts.into_iter().map(|(affine, count)| search.refine("landmarks", affine, count));
     found.fold(identity, |best, next| if next.1 > best.1 { next } else { best }).0
 }
@@ -150,7 +150,7 @@ impl Search<'_> {
 
     /// Affine maps that many landmark pairs agree on, within a few metres and within more: centroids of
     /// cut or edited features are off by any amount. With each, how many pairs agree.
-    fn from_landmarks(&self, pairs: &[[[f64; 2]; 2]]) -> Vec<(Affine, usize)> {
+    fn landmark_starts(&self, pairs: &[[[f64; 2]; 2]]) -> Vec<(Affine, usize)> {
         let unit = self.ground.metres_per_unit(self.reference.vertices.centre());
         let consensus = |metres: f64| consensus(pairs, unit, metres);
         [1.0, 5.0, 25.0].iter().filter_map(|factor| consensus(factor * self.radius_m)).collect()
