@@ -1,0 +1,226 @@
+//! docs/*.schema.json describe what the programs write, and nothing else.
+
+use meshmark_core::{
+    embedding::Displacement,
+    options::{Kind, OPTIONS},
+    record::{DisplacementEntry, Record, Reference},
+};
+use serde_json::{Value, json};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn schema(name: &str) -> Value {
+    let path = root().join(format!("docs/{name}.schema.json"));
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// What the schema finds wrong with a document.
+fn errors(name: &str, document: &Value) -> Vec<String> {
+    let schema = schema(name);
+    jsonschema::meta::validate(&schema).expect("the schema is one");
+    let validator = jsonschema::draft202012::new(&schema).unwrap();
+    validator.iter_errors(document).map(|e| format!("{}: {e}", e.instance_path())).collect()
+}
+
+fn assert_valid(name: &str, document: &Value) {
+    let errors = errors(name, document);
+    assert!(errors.is_empty(), "{errors:#?}\n{document:#}");
+}
+
+/// `document` with the value at `pointer` replaced.
+fn with(document: &Value, pointer: &str, value: Value) -> Value {
+    let mut changed = document.clone();
+    *changed.pointer_mut(pointer).unwrap_or_else(|| panic!("{pointer} of {document:#}")) = value;
+    changed
+}
+
+fn without(document: &Value, object: &str, field: &str) -> Value {
+    let mut changed = document.clone();
+    changed.pointer_mut(object).unwrap().as_object_mut().unwrap().remove(field).expect("it was there");
+    changed
+}
+
+fn assert_refused(name: &str, document: &Value, changes: &[(&str, Value)]) {
+    for (pointer, value) in changes {
+        let changed = with(document, pointer, value.clone());
+        assert!(!errors(name, &changed).is_empty(), "{pointer} = {value} is not refused");
+    }
+}
+
+/// Every object of a document, as its schema sees it, has all its fields and no other.
+fn assert_closed(name: &str, document: &Value, objects: &[&str]) {
+    for object in objects {
+        let fields = document.pointer(object).unwrap().as_object().unwrap().clone();
+        for field in fields.keys() {
+            let missing = without(document, object, field);
+            assert!(!errors(name, &missing).is_empty(), "{object}/{field} may be missing");
+        }
+        let mut more = document.clone();
+        more.pointer_mut(object).unwrap()["colour"] = json!("red");
+        assert!(!errors(name, &more).is_empty(), "{object} takes any field");
+    }
+}
+
+fn record() -> Record {
+    Record {
+        meshmark_record: meshmark_core::record::VERSION,
+        software: "meshmark 0.1.0".into(),
+        key_id: "434471506306423b".into(),
+        recipient: None,
+        message: "095abfcd9510d386660bcc7d0e7b8760".into(),
+        amplitude_m: 0.1,
+        chip_rate: 2,
+        patch_size: 480,
+        tolerance_m: 0.75,
+        precision_crs_units: None,
+        layers: None,
+        srs: None,
+        reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
+        displacement: DisplacementEntry::from(Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 }),
+    }
+}
+
+fn json_of(record: &Record) -> Value {
+    serde_json::from_str(&record.to_json()).unwrap()
+}
+
+#[test]
+fn records_are_valid_with_every_field_given_and_with_none() {
+    assert_valid("record", &json_of(&record()));
+    let full = Record {
+        recipient: Some("ACME GmbH".into()),
+        precision_crs_units: Some(0.01),
+        layers: Some(vec!["buildings".into(), "roads".into()]),
+        srs: Some("EPSG:3067".into()),
+        reference: Reference { crs: Some("EPSG:3067".into()), ..record().reference },
+        ..record()
+    };
+    assert_valid("record", &json_of(&full));
+}
+
+#[test]
+fn the_record_that_the_driver_wrote_is_valid() {
+    let text = fs::read_to_string(root().join("fixtures/vectors/record.json")).unwrap();
+    assert_valid("record", &serde_json::from_str(&text).unwrap());
+}
+
+#[test]
+fn wrong_records_are_refused() {
+    let record = json_of(&record());
+    assert_closed("record", &record, &["", "/reference", "/displacement"]);
+    let changes = [
+        ("/meshmark_record", json!(2)),
+        ("/key_id", json!("434471506306423")),
+        ("/recipient", json!(" ")),
+        ("/message", json!("0")),
+        ("/message", json!("xy")),
+        ("/message", Value::Null),
+        ("/layers", json!([])),
+        ("/layers", json!([""])),
+        ("/srs", json!("")),
+        ("/reference/vertices", json!(15)),
+        ("/reference/patches", json!(0)),
+        ("/reference/vertices_sha256", json!("0F".repeat(32))),
+        ("/displacement/rms_m", json!(-0.1)),
+        ("/displacement/max_m", Value::Null),
+    ];
+    assert_refused("record", &record, &changes);
+}
+
+/// The ranges are written once more in the schemas, and must be those of the table.
+#[test]
+fn the_ranges_are_those_of_the_options() {
+    let documents =
+        [("record", "", json_of(&record())), ("report", "/parameters", report("unmarked map", &[]))];
+    for (name, object, document) in documents {
+        for option in OPTIONS {
+            let unit = match option.name {
+                "AMPLITUDE" | "TOLERANCE" => "_m",
+                "PRECISION" => "_crs_units",
+                _ => "",
+            };
+            let pointer = format!("{object}/{}{unit}", option.name.to_lowercase());
+            let (legal, illegal) = match option.kind {
+                Kind::Text => continue,
+                Kind::Number(above, most) => {
+                    ([json!(above + 1e-9), json!(most)], [json!(above), json!(most * 1.01)])
+                }
+                Kind::Integer(least, most) => {
+                    ([json!(least), json!(most)], [json!(least - 1), json!(most + 1)])
+                }
+            };
+            legal.into_iter().for_each(|value| assert_valid(name, &with(&document, &pointer, value)));
+            illegal.into_iter().for_each(|value| assert_refused(name, &document, &[(&pointer, value)]));
+        }
+    }
+}
+
+/// The report of the real program on a suspect, by what it is.
+fn report(suspect: &str, flags: &[&str]) -> Value {
+    let file = match suspect {
+        "marked map" => "vectors/marked.gpkg",
+        "unmarked map" => "kotka.gpkg",
+        "another map" => "helsinki.gpkg",
+        other => panic!("no {other} among the fixtures"),
+    };
+    let output = Command::new(env!("CARGO_BIN_EXE_meshmark"))
+        .current_dir(root().join("fixtures"))
+        .args(["verify", "--json", "--key", "vectors/key.json", "--reference", "kotka.gpkg"])
+        .args(flags)
+        .arg(file)
+        .output()
+        .unwrap();
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn reports_are_valid_for_every_verdict_and_both_demodulators() {
+    let record = ["--record", "vectors/record.json"];
+    for (suspect, flags, verdict) in [
+        ("marked map", record.to_vec(), "match"),
+        ("marked map", [&record[..], &["--demodulator", "paper"]].concat(), "match"),
+        ("unmarked map", record.to_vec(), "no-match"),
+        ("another map", record.to_vec(), "inconclusive"),
+        ("marked map", vec!["--layers", "buildings,landuse,roads", "--precision", "0.001"], "inconclusive"),
+    ] {
+        let report = report(suspect, &flags);
+        assert_eq!(report["verdict"], verdict, "{suspect} {flags:?}");
+        assert_valid("report", &report);
+    }
+}
+
+#[test]
+fn wrong_reports_are_refused() {
+    let report = report("marked map", &["--record", "vectors/record.json"]);
+    assert_closed("report", &report, &["", "/registration", "/vertices", "/parameters"]);
+    let changes = [
+        ("/meshmark_report", json!("1")),
+        ("/verdict", json!("no match")),
+        ("/verdict", json!("MATCH")),
+        ("/reason", json!("")),
+        ("/message", json!("ABCD")),
+        ("/bits/0", Value::Null),
+        ("/bit_errors", json!(-1)),
+        ("/p_value_log10", json!(0.5)),
+        ("/p_mark_log10", json!("-inf")),
+        ("/registration/affine", json!([1, 0, 0, 0, 1])),
+        ("/registration/rms_m", json!(-0.1)),
+        ("/vertices/matched", json!(1.5)),
+        ("/parameters/demodulator", json!("best")),
+        ("/parameters/significance", json!(1)),
+        ("/parameters/radius_m", json!(0)),
+        ("/seconds/reading", json!(-1)),
+    ];
+    assert_refused("report", &report, &changes);
+    assert!(!errors("report", &with(&report, "/seconds", json!({}))).is_empty());
+    let unknown_stage = with(&report, "/seconds", json!({ "painting": 1 }));
+    assert!(!errors("report", &unknown_stage).is_empty());
+}
