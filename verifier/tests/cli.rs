@@ -1,0 +1,111 @@
+//! The command line, pinned: exact stdout, stderr and exit code of tests/cmd/*.toml.
+//!
+//! All cases run in one folder of small files; [`make_files`] says what each of them is. `[..]` stands
+//! for what may differ between machines, `...` for such lines. After a change that is meant, copy the
+//! new output from the failing test.
+
+use meshmark_core::key::SecretKey;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+const MESHMARK: &str = env!("CARGO_BIN_EXE_meshmark");
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures")
+}
+
+#[test]
+fn the_command_line_is_as_written() {
+    let folder = tempfile::tempdir().unwrap();
+    make_files(folder.path());
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cmd");
+    assert!(cases.read_dir().unwrap().count() > 50, "trycmd is content with no case at all");
+    std::env::set_current_dir(folder.path()).unwrap(); // where trycmd runs a case that names no folder
+    trycmd::TestCases::new()
+        .default_bin_path(MESHMARK)
+        .env("GDAL_DRIVER_PATH", "none") // the verifier needs no plugin
+        .case(cases.join("*.toml"))
+        .run();
+}
+
+/// What the cases work on: the test vectors, and files that are wrong in one way each.
+fn make_files(folder: &Path) {
+    let copy = |from: &str, to: &str| {
+        fs::copy(fixtures().join(from), folder.join(to)).unwrap();
+    };
+    copy("kotka.gpkg", "reference.gpkg");
+    copy("kotka.gpkg", "unmarked.gpkg");
+    copy("helsinki.gpkg", "another_map.gpkg");
+    for file in ["key.json", "record.json", "marked.gpkg"] {
+        copy(&format!("vectors/{file}"), file);
+    }
+    let write = |file: &str, bytes: &[u8]| fs::write(folder.join(file), bytes).unwrap();
+    let (key, record) = (read(folder, "key.json"), read(folder, "record.json"));
+    write("another_key.json", SecretKey::from_bytes([1; 32]).to_json().as_bytes());
+    write("changed_key.json", key.replace("000102", "000103").as_bytes());
+    write("record_of_another_reference.json", record.replace("ce0eba", "ce0ebb").as_bytes());
+    write("record_of_another_message.json", record.replace("095abf", "f95abf").as_bytes());
+    write("record_of_another_recipient.json", record.replace("ACME GmbH", "Another Ltd").as_bytes());
+    write("record_of_a_later_version.json", record.replace("_record\": 1", "_record\": 2").as_bytes());
+    write("record_with_a_negative_amplitude.json", record.replace("0.1,", "-0.1,").as_bytes());
+    write("record_with_a_comment.json", record.replacen("{", "{ \"comment\": \"\",", 1).as_bytes());
+    write("text.txt", b"This is no map.\n");
+    write("truncated.gpkg", &fs::read(folder.join("marked.gpkg")).unwrap()[..100_000]);
+    write(
+        "marked.vrt",
+        b"<OGRVRTDataSource><OGRVRTLayer name='roads'><SrcDataSource relativeToVRT='1'>marked.gpkg\
+          </SrcDataSource></OGRVRTLayer></OGRVRTDataSource>",
+    );
+}
+
+fn read(folder: &Path, file: &str) -> String {
+    fs::read_to_string(folder.join(file)).unwrap()
+}
+
+fn keygen(path: &Path) -> Output {
+    Command::new(MESHMARK).arg("keygen").arg(path).output().unwrap()
+}
+
+#[test]
+#[cfg(unix)]
+fn only_its_owner_can_read_a_new_key_and_no_two_keys_are_equal() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let make = |file: &str| {
+        let path = folder.path().join(file);
+        assert!(keygen(&path).status.success());
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        SecretKey::from_json(&fs::read_to_string(&path).unwrap()).unwrap().id()
+    };
+    assert_ne!(make("a.json"), make("b.json"));
+}
+
+#[test]
+fn an_existing_file_keeps_its_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("key.json");
+    fs::write(&path, "an old key").unwrap();
+    assert_eq!(keygen(&path).status.code(), Some(2));
+    assert_eq!(fs::read_to_string(&path).unwrap(), "an old key");
+}
+
+#[test]
+fn no_output_holds_the_secret() {
+    let folder = tempfile::tempdir().unwrap();
+    make_files(folder.path());
+    let secret = "000102030405060708090a0b0c0d0e0f";
+    assert!(read(folder.path(), "key.json").contains(secret));
+    for arguments in [
+        "verify --key key.json --reference text.txt marked.gpkg",
+        "verify --key changed_key.json --reference reference.gpkg marked.gpkg",
+        "verify --key key.json --reference reference.gpkg --recipient A --json marked.gpkg",
+    ] {
+        let output =
+            Command::new(MESHMARK).current_dir(folder.path()).args(arguments.split(' ')).output().unwrap();
+        let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+        assert!(!text.is_empty() && !text.to_lowercase().contains(&secret[4..20]), "{text}");
+    }
+}
