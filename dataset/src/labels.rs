@@ -36,7 +36,8 @@ pub(crate) fn of_feature(feature: &Feature, fields: &LabelFields, labels: &mut V
     if values.is_empty() {
         return;
     }
-    let Some((point, dimension)) = feature.geometry().and_then(place) else { return };
+    // A null geometry is an error here; `Feature::geometry` would hand out a null pointer.
+    let Some((point, dimension)) = feature.geometry_by_index(0).ok().and_then(place) else { return };
     labels.extend(values.into_iter().map(|value| Label { value, point, dimension }));
 }
 
@@ -51,7 +52,7 @@ fn text(value: FieldValue) -> Option<String> {
 }
 
 fn place(geometry: &Geometry) -> Option<([f64; 2], Dimension)> {
-    if !geometry.has_gdal_ptr() || geometry.is_empty() {
+    if geometry.is_empty() {
         return None;
     }
     let geometry = geometry.to_geo().ok()?; // curves have no counterpart in geo and give no label

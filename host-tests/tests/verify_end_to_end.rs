@@ -1,0 +1,147 @@
+//! Mark with `ogr2ogr`, do to the file what people do, verify with `meshmark verify`.
+
+use meshmark_host_tests::{
+    attacks::{Map, features, similarity},
+    plugin::{Host, Run, library},
+};
+use serde_json::Value;
+
+/// `meshmark verify --json` with the host's key; `more` holds flags and, last, the suspect.
+fn verify(host: &Host, reference: &str, more: &[&str]) -> (Run, Value) {
+    let command = library().with_file_name("meshmark");
+    let mut arguments = vec!["verify", "--json", "--key", "key.json", "--reference", reference];
+    arguments.extend(more);
+    let run = host.run(command.to_str().unwrap(), &arguments);
+    let report = serde_json::from_str(&run.stdout).unwrap_or(Value::Null);
+    (run, report)
+}
+
+#[track_caller]
+fn matches(host: &Host, reference: &str, more: &[&str]) -> Value {
+    let (run, report) = verify(host, reference, more);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    assert_eq!(report["verdict"], "match");
+    assert_eq!(report["bit_errors"], 0);
+    assert!(report["p_value_log10"].as_f64().unwrap() < -12.0);
+    report
+}
+
+/// A host with a map and the copy of it that ACME GmbH got.
+fn marked(fixture: &str, options: &[&str]) -> Host {
+    let host = Host::new();
+    host.copy(fixture, "map.gpkg");
+    let mut with_record = vec!["-oo", "RECORD=acme.json"];
+    with_record.extend(options);
+    host.mark("GPKG", "marked.gpkg", "map.gpkg", &with_record).succeeds();
+    host
+}
+
+#[test]
+fn the_message_is_read_from_every_common_format() {
+    for (format, output) in [
+        ("GPKG", "marked.gpkg"),
+        ("ESRI Shapefile", "marked"),
+        ("GeoJSON", "marked.geojson"),
+        ("FlatGeobuf", "marked.fgb"),
+    ] {
+        let host = Host::new();
+        host.copy("kotka.gpkg", "map.gpkg");
+        // GeoJSON and a FlatGeobuf file hold one layer.
+        let one_layer = ["-oo", "LAYERS=buildings", "-oo", "RECORD=acme.json", "buildings"];
+        let all = ["-oo", "RECORD=acme.json"];
+        let options: &[&str] = if output.contains(".geojson") || output.contains(".fgb") { &one_layer } else { &all };
+        host.mark(format, output, "map.gpkg", options).succeeds();
+        matches(&host, "map.gpkg", &["--record", "acme.json", output]);
+    }
+}
+
+#[test]
+fn the_message_is_read_without_a_record() {
+    let host = marked("helsinki.gpkg", &["-oo", "CHIP_RATE=3", "-oo", "AMPLITUDE=0.15"]);
+    let how = ["--chip-rate", "3", "--amplitude", "0.15"];
+    matches(&host, "map.gpkg", &[&how[..], &["--recipient", "ACME GmbH", "marked.gpkg"]].concat());
+    let message = host.key().recipient_message("ACME GmbH").to_hex();
+    let report = matches(&host, "map.gpkg", &[&how[..], &["--message", &message, "marked.gpkg"]].concat());
+    assert_eq!(report["message"], message.as_str());
+
+    // Nothing is expected: the message is decoded all the same, and nobody is accused.
+    let (run, report) = verify(&host, "map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
+    assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
+    assert_eq!(report["message"], message.as_str());
+    assert!(report["bit_errors"].is_null() && report["p_value_log10"].is_null());
+}
+
+#[test]
+fn one_layer_of_many_can_be_marked_and_verified() {
+    let host = marked("helsinki.gpkg", &["-oo", "LAYERS=buildings,roads"]);
+    let report = matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
+    assert_eq!(report["parameters"]["layers"], serde_json::json!(["buildings", "roads"]));
+}
+
+#[test]
+fn a_map_in_degrees_is_marked_and_read_in_metres() {
+    let host = marked("europe_deg.gpkg", &[]);
+    let report = matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
+    let rms_m = report["registration"]["rms_m"].as_f64().unwrap();
+    assert!((0.05..0.15).contains(&rms_m), "{rms_m}");
+}
+
+#[test]
+fn points_z_m_curves_and_surfaces_carry_a_message() {
+    let host = marked("shapes.gpkg", &[]);
+    matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
+}
+
+#[test]
+fn shuffled_features_carry_the_message() {
+    let host = marked("helsinki.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    features::scramble(&map, 5).write(&host.path("shuffled.gpkg")).unwrap();
+    matches(&host, "map.gpkg", &["--record", "acme.json", "shuffled.gpkg"]);
+}
+
+#[test]
+fn a_translated_rotated_scaled_copy_is_found_by_its_landmarks() {
+    let host = marked("helsinki.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    let turned = similarity::linear(&map, similarity::rotation(45.0), similarity::About::Corner).unwrap();
+    let scaled = similarity::linear(&turned, similarity::scaling(5.5, 5.5), similarity::About::Corner).unwrap();
+    similarity::translate(&scaled, [1000.0, -500.0]).write(&host.path("moved.gpkg")).unwrap();
+    for landmark in [&[][..], &["--landmark", "name", "--landmark", "osm_id"][..]] {
+        let report = matches(&host, "map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
+        assert_eq!(report["registration"]["method"], "landmarks");
+        assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
+        assert!(report["registration"]["rms_m"].as_f64().unwrap() < 0.12);
+    }
+}
+
+#[test]
+fn a_suspect_in_another_crs_is_reprojected() {
+    let host = marked("helsinki.gpkg", &[]);
+    for srs in ["EPSG:4326", "EPSG:3857", "EPSG:2393"] {
+        host.run("ogr2ogr", &["-t_srs", srs, "other.gpkg", "marked.gpkg", "-overwrite"]);
+        matches(&host, "map.gpkg", &["--record", "acme.json", "other.gpkg"]);
+    }
+}
+
+#[test]
+fn nobody_is_accused_by_a_wrong_key_an_unmarked_map_another_map_or_another_recipient() {
+    let host = marked("helsinki.gpkg", &[]);
+    let other_key = meshmark_core::key::SecretKey::from_bytes([1; 32]);
+    std::fs::write(host.path("other_key.json"), other_key.to_json().as_bytes()).unwrap();
+    host.copy("kotka.gpkg", "kotka.gpkg");
+
+    let (_, report) = verify(&host, "map.gpkg", &["--recipient", "Somebody Else", "marked.gpkg"]);
+    assert_eq!(report["verdict"], "no-match");
+    let (run, report) = verify(&host, "map.gpkg", &["--record", "acme.json", "map.gpkg"]);
+    assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
+    let (run, report) = verify(&host, "map.gpkg", &["--record", "acme.json", "kotka.gpkg"]);
+    assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
+
+    let command = library().with_file_name("meshmark");
+    let wrong_key = ["verify", "--json", "--key", "other_key.json", "--reference", "map.gpkg"];
+    let arguments = [&wrong_key[..], &["--recipient", "ACME GmbH", "marked.gpkg"]].concat();
+    let run = host.run(command.to_str().unwrap(), &arguments);
+    let report: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
+}
