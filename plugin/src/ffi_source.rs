@@ -69,17 +69,15 @@ impl Drop for OwnedSource {
     }
 }
 
+/// Whether only raster drivers know the dataset: a damaged GeoPackage could be both.
 fn is_raster(name: &CStr) -> bool {
-    // SAFETY: the name is a C string; null lists mean all drivers and no sibling files.
-    unsafe {
-        let driver = gdal_sys::GDALIdentifyDriverEx(
-            name.as_ptr(),
-            GdalOpenFlags::GDAL_OF_RASTER.bits(),
-            ptr::null(),
-            ptr::null(),
-        );
+    let known = |kind: GdalOpenFlags| {
+        // SAFETY: the name is a C string; null lists mean all drivers and no sibling files.
+        let driver =
+            unsafe { gdal_sys::GDALIdentifyDriverEx(name.as_ptr(), kind.bits(), ptr::null(), ptr::null()) };
         !driver.is_null()
-    }
+    };
+    known(GdalOpenFlags::GDAL_OF_RASTER) && !known(GdalOpenFlags::GDAL_OF_VECTOR)
 }
 
 /// A dataset of somebody else, for the `gdal` crate: it is not closed here.

@@ -1,0 +1,163 @@
+//! The driver as a user has it: GDAL's own programs, the plugin in a folder, a key file.
+
+use meshmark_core::key::SecretKey;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    time::SystemTime,
+};
+use tempfile::TempDir;
+
+/// Folders whose files make the plugin.
+const SOURCES: [&str; 4] = ["core/src", "dataset/src", "plugin/src", "plugin/cpp"];
+
+/// The plugin that cargo built.
+///
+/// # Panics
+/// When it is not there, or older than its sources: a test must not pass on yesterday's plugin.
+pub fn library() -> PathBuf {
+    let program = std::env::current_exe().expect("a program has a path");
+    let folder = program.parent().and_then(Path::parent).expect("cargo puts tests in deps/");
+    let library = folder.join("libmeshmark_plugin.so");
+    let remedy = "run `make build` first";
+    let built = modified(&library).unwrap_or_else(|| panic!("{} is missing: {remedy}", library.display()));
+    for source in SOURCES {
+        let newest = newest(&workspace().join(source));
+        assert!(newest <= Some(built), "{} is older than {source}: {remedy}", library.display());
+    }
+    library
+}
+
+/// A fixture's path.
+pub fn fixture(name: &str) -> PathBuf {
+    workspace().join("fixtures").join(name)
+}
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a member of a workspace").into()
+}
+
+fn modified(path: &Path) -> Option<SystemTime> {
+    path.metadata().and_then(|metadata| metadata.modified()).ok()
+}
+
+fn newest(folder: &Path) -> Option<SystemTime> {
+    let files = fs::read_dir(folder).expect("a source folder").map(|entry| entry.expect("readable").path());
+    files.filter_map(|file| modified(&file)).max()
+}
+
+/// A folder of its own with the key `key.json`, in which GDAL's programs find the plugin.
+pub struct Host {
+    work: TempDir,
+    plugins: TempDir,
+}
+
+impl Default for Host {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Host {
+    /// Sets the folder up.
+    pub fn new() -> Self {
+        let host = Host { work: tempfile::tempdir().unwrap(), plugins: tempfile::tempdir().unwrap() };
+        std::os::unix::fs::symlink(library(), host.plugins.path().join("ogr_MESHMARK.so")).unwrap();
+        fs::write(host.path("key.json"), host.key().to_json().as_bytes()).unwrap();
+        host
+    }
+
+    /// The key in `key.json`.
+    pub fn key(&self) -> SecretKey {
+        SecretKey::from_bytes([0xc5; 32])
+    }
+
+    /// The key's secret as the key file has it: must never be seen elsewhere.
+    pub fn secret(&self) -> String {
+        "c5".repeat(32)
+    }
+
+    /// A file of the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.work.path().join(name)
+    }
+
+    /// Copies a fixture into the folder.
+    pub fn copy(&self, fixture_name: &str, name: &str) {
+        fs::copy(fixture(fixture_name), self.path(name)).unwrap();
+    }
+
+    /// What is in the folder: names and contents.
+    pub fn files(&self) -> Vec<(String, Vec<u8>)> {
+        let entries = fs::read_dir(self.work.path()).unwrap().map(|entry| entry.unwrap().path());
+        let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+        let mut files: Vec<_> =
+            entries.map(|path| (name(&path), fs::read(&path).unwrap_or_default())).collect();
+        files.sort();
+        files
+    }
+
+    /// Runs a program of GDAL in the folder, with the plugin.
+    pub fn run(&self, program: &str, arguments: &[&str]) -> Run {
+        self.run_with(program, arguments, &[])
+    }
+
+    /// The same with configuration options.
+    pub fn run_with(&self, program: &str, arguments: &[&str], configuration: &[(&str, &str)]) -> Run {
+        let mut command = Command::new(program);
+        command.args(arguments).current_dir(self.work.path());
+        for name in ["MESHMARK_KEY", "GDAL_NUM_THREADS", "CPL_DEBUG", "CPL_LOG", "OGR_SQLITE_JOURNAL"] {
+            command.env_remove(name);
+        }
+        command.env("GDAL_DRIVER_PATH", self.plugins.path()).env("LC_ALL", "C.UTF-8");
+        command.envs(configuration.iter().copied());
+        let output = command.output().unwrap_or_else(|e| panic!("{program} cannot be run: {e}"));
+        Run {
+            line: format!("{program} {}", arguments.join(" ")),
+            code: output.status.code(),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// `ogr2ogr -f FORMAT output MESHMARK:source` with the key, a recipient and more options.
+    pub fn mark(&self, format: &str, output: &str, source: &str, options: &[&str]) -> Run {
+        let source = format!("MESHMARK:{source}");
+        let mut arguments = vec!["-f", format, output, &source];
+        arguments.extend(["-oo", "KEY=key.json", "-oo", "RECIPIENT=ACME GmbH"]);
+        arguments.extend(options);
+        self.run("ogr2ogr", &arguments)
+    }
+}
+
+/// What a program did.
+pub struct Run {
+    line: String,
+    /// Its exit code, none when a signal ended it.
+    pub code: Option<i32>,
+    /// What it printed.
+    pub stdout: String,
+    /// What it complained about.
+    pub stderr: String,
+}
+
+impl Run {
+    /// Asserts that it succeeded without an error message.
+    #[track_caller]
+    pub fn succeeds(self) -> Self {
+        assert_eq!(self.code, Some(0), "{}\n{}{}", self.line, self.stdout, self.stderr);
+        assert!(self.errors().is_empty(), "{}\n{}", self.line, self.stderr);
+        self
+    }
+
+    /// The failures of GDAL among its messages.
+    pub fn errors(&self) -> Vec<&str> {
+        self.stderr.lines().filter(|line| line.starts_with("ERROR ")).collect()
+    }
+
+    /// The warnings of GDAL among its messages.
+    pub fn warnings(&self) -> Vec<&str> {
+        self.stderr.lines().filter(|line| line.starts_with("Warning ")).collect()
+    }
+}
