@@ -1,4 +1,5 @@
 pub mod attacks;
 pub mod cgal;
 pub mod delaunay_check;
+pub mod table2;
 pub mod vectors;

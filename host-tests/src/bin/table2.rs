@@ -1,0 +1,120 @@
+//! Marks maps, attacks the copies, verifies them, and compares the bit errors with the paper's Table 2.
+
+use clap::Parser;
+use meshmark_host_tests::table2::{
+    Result,
+    cases::{Case, Table},
+    experiment::{Outcome, Plan, run},
+    figures, markdown,
+    product::Product,
+};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+/// Rerun Table 2 of Ohbuchi, Ueda and Endoh 2003 with the driver and the verifier of this build.
+#[derive(Parser)]
+struct Arguments {
+    /// Maps in metres, or folders of GeoPackages
+    #[arg(required = true)]
+    maps: Vec<PathBuf>,
+    /// Folder for table2.md, table2.json and the figures
+    #[arg(long, default_value = "table2")]
+    out: PathBuf,
+    /// Only the attacks of the paper, only chip rate 2
+    #[arg(long)]
+    quick: bool,
+    /// Only these rows, for example 6,9c,dp0.5
+    #[arg(long, value_delimiter = ',')]
+    rows: Vec<String>,
+    /// Seed of keys and attacks
+    #[arg(long, default_value_t = 2003)]
+    seed: u64,
+    /// Processes at a time
+    #[arg(long, default_value_t = 2)]
+    jobs: usize,
+    /// Folder of `meshmark` and `gdalplugins/` [default: where this program is]
+    #[arg(long)]
+    tools: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    // The verdicts speak; GDAL's warnings about versions of GeoPackage do not help.
+    gdal::config::set_error_handler(|_, _, _| {});
+    match run_all(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("table2: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run_all(arguments: Arguments) -> Result<()> {
+    let product = match &arguments.tools {
+        Some(folder) => Product::in_folder(folder)?,
+        None => Product::of_this_build()?,
+    };
+    let (quick, rows) = (arguments.quick, arguments.rows.clone());
+    let wanted = move |case: &Case| match rows.is_empty() {
+        true => !quick || case.table() == Table::Paper,
+        false => rows.contains(&case.id()),
+    };
+    let plan = Plan {
+        maps: geopackages(&arguments.maps)?,
+        chip_rates: if quick { vec![2] } else { vec![2, 3] },
+        wanted: Box::new(wanted),
+        seed: arguments.seed,
+        workers: arguments.jobs.max(1),
+    };
+    println!("seed {}, {} maps", plan.seed, plan.maps.len());
+    std::fs::create_dir_all(&arguments.out)?;
+    let outcomes = run(&product, &plan, print)?;
+    write(&arguments.out, &outcomes, plan.seed, &product.version()?)
+}
+
+/// Files as they are given, folders as the GeoPackages in them.
+fn geopackages(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut maps = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            maps.push(path.clone());
+            continue;
+        }
+        let files = path.read_dir()?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+        let mut files: Vec<PathBuf> =
+            files.into_iter().filter(|file| file.extension().is_some_and(|e| e == "gpkg")).collect();
+        files.sort();
+        maps.extend(files);
+    }
+    if maps.is_empty() {
+        return Err("there is no GeoPackage in the folders given".into());
+    }
+    Ok(maps)
+}
+
+fn print(o: &Outcome) {
+    let errors = o.bit_errors.map_or("not registered".into(), |errors| format!("{errors} of {}", o.bits));
+    println!(
+        "{:20} c={} {:12} {:6} {:12} {errors}, {} ({:.1} s)",
+        o.map,
+        o.chip_rate,
+        o.case,
+        o.demodulator,
+        o.asked,
+        o.verdict.as_deref().unwrap_or(&o.reason),
+        o.seconds
+    );
+}
+
+fn write(folder: &Path, outcomes: &[Outcome], seed: u64, version: &str) -> Result<()> {
+    std::fs::write(folder.join("table2.md"), markdown::report(outcomes, seed, version))?;
+    let json = serde_json::json!({ "seed": seed, "software": version, "outcomes": outcomes });
+    std::fs::write(folder.join("table2.json"), serde_json::to_string_pretty(&json)? + "\n")?;
+    for (file, svg) in figures::all(outcomes) {
+        std::fs::write(folder.join(file), svg)?;
+    }
+    println!("written to {}", folder.join("table2.md").display());
+    Ok(())
+}

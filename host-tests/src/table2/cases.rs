@@ -1,0 +1,83 @@
+//! What is done to a marked map, and who is asked about afterwards.
+
+use crate::attacks::{Map, Row, extended_rows, paper_rows};
+use std::sync::Arc;
+
+/// Innocent recipients asked about after a collusion.
+pub const INNOCENTS: usize = 4;
+/// The most copies that collude.
+pub const MOST_COPIES: usize = 8;
+
+/// One row of the experiment.
+#[derive(Debug, Clone)]
+pub enum Case {
+    /// A marked copy is attacked.
+    Attacked { row: Row, in_paper: bool },
+    /// The suspect is the map before marking.
+    Unmarked,
+    /// The marked copy is marked again with another key: a pirate's own mark.
+    MarkedAgain,
+    /// So many recipients average their copies.
+    Collusion { copies: usize },
+}
+
+impl Case {
+    /// A short name, unique.
+    pub fn id(&self) -> String {
+        match self {
+            Case::Attacked { row, .. } => row.id.clone(),
+            Case::Unmarked => "unmarked".into(),
+            Case::MarkedAgain => "again".into(),
+            Case::Collusion { copies } => format!("average{copies}"),
+        }
+    }
+
+    /// What is done.
+    pub fn title(&self) -> String {
+        match self {
+            Case::Attacked { row, .. } => row.title.clone(),
+            Case::Unmarked => "not marked at all".into(),
+            Case::MarkedAgain => "marked again with another key".into(),
+            Case::Collusion { copies } => format!("average of {copies} copies"),
+        }
+    }
+
+    /// The attack's strength, if it has one.
+    pub fn strength(&self) -> Option<f64> {
+        match self {
+            Case::Attacked { row, .. } => row.attack.strength(),
+            _ => None,
+        }
+    }
+
+    /// Which of the report's tables it belongs to.
+    pub fn table(&self) -> Table {
+        match self {
+            Case::Attacked { in_paper: true, .. } => Table::Paper,
+            Case::Attacked { in_paper: false, .. } => Table::Extended,
+            _ => Table::Special,
+        }
+    }
+}
+
+/// The tables of the report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Table {
+    /// Table 2 of the paper.
+    Paper,
+    /// Attacks the paper does not have.
+    Extended,
+    /// More than one question about a suspect, or none that should be answered with yes.
+    Special,
+}
+
+/// All cases for a map; `foreign` is laid over it in one of them.
+pub fn all(foreign: Arc<Map>) -> Vec<Case> {
+    let attacked = |in_paper| move |row| Case::Attacked { row, in_paper };
+    let mut cases: Vec<Case> = paper_rows().into_iter().map(attacked(true)).collect();
+    cases.extend(extended_rows(foreign).into_iter().map(attacked(false)));
+    cases.extend([Case::Unmarked, Case::MarkedAgain]);
+    cases.extend([2, 4, MOST_COPIES].map(|copies| Case::Collusion { copies }));
+    cases
+}

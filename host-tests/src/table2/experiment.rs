@@ -1,0 +1,383 @@
+//! The experiment: maps are rounded and marked, copies attacked, suspects verified.
+
+use super::{
+    Result,
+    cases::{Case, INNOCENTS, MOST_COPIES, Table, all},
+    product::{Asked, Marking, Product, Report, write_key},
+};
+use crate::attacks::{Map, collusion, noise, similarity};
+use meshmark_core::ground::Ground;
+use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Target, survey};
+use serde::Serialize;
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
+
+/// The paper's maps have integer coordinates in units of 10 cm.
+const PRECISION_M: f64 = 0.1;
+
+/// What to run.
+pub struct Plan {
+    pub maps: Vec<PathBuf>,
+    pub chip_rates: Vec<usize>,
+    /// Whether a case is run at all.
+    pub wanted: Box<dyn Fn(&Case) -> bool>,
+    pub seed: u64,
+    /// Processes at a time.
+    pub workers: usize,
+}
+
+/// The answer to one question about one suspect.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    pub table: Table,
+    pub map: String,
+    pub chip_rate: usize,
+    pub case: String,
+    pub title: String,
+    pub strength: Option<f64>,
+    /// Of the attack.
+    pub seed: u64,
+    pub demodulator: &'static str,
+    /// About whom the question was.
+    pub asked: String,
+    /// Whether the right answer is yes.
+    pub guilty: bool,
+    /// None when the command gave no answer; `reason` is then what it printed.
+    pub verdict: Option<String>,
+    pub reason: String,
+    pub bits: usize,
+    /// None when the suspect was not registered.
+    pub bit_errors: Option<usize>,
+    pub p_value_log10: Option<f64>,
+    pub p_mark_log10: Option<f64>,
+    pub p_recipient_log10: Option<f64>,
+    pub registration: Option<String>,
+    pub landmarks: usize,
+    pub rms_m: Option<f64>,
+    pub vertices_reference: usize,
+    pub vertices_suspect: usize,
+    pub vertices_matched: usize,
+    pub seconds: f64,
+}
+
+/// A copy of a map.
+struct Copy {
+    recipient: String,
+    path: PathBuf,
+    record: PathBuf,
+}
+
+/// A map with its marked copies at one chip rate.
+struct Sheet {
+    name: String,
+    chip_rate: usize,
+    reference: PathBuf,
+    copies: Vec<Copy>,
+}
+
+/// The number of a sheet, and what to do with it.
+type Job = (usize, Case);
+
+/// A question: the suspect is what a [`Case`] made.
+struct Question {
+    asked: String,
+    guilty: bool,
+    key: PathBuf,
+    reference: PathBuf,
+    /// `None`: the options a record would hold are given one by one.
+    record: Option<PathBuf>,
+}
+
+/// Runs a plan; `report` is called with every outcome as it comes.
+///
+/// # Errors
+/// Maps that cannot be read, are not in metres or cannot be marked. A suspect that cannot be verified is an
+/// outcome, not an error.
+pub fn run(product: &Product, plan: &Plan, report: impl Fn(&Outcome) + Sync) -> Result<Vec<Outcome>> {
+    let folder = tempfile::tempdir()?;
+    let lab = Lab { product, folder: folder.path().into(), seed: plan.seed };
+    write_key(&lab.key(), plan.seed)?;
+    write_key(&lab.pirates_key(), plan.seed + 1)?;
+    let (sheets, jobs) = lab.prepare(plan)?;
+    let outcomes = Mutex::new(Vec::new());
+    let next = AtomicUsize::new(0);
+    let work = |worker: usize| -> Result<()> {
+        while let Some((sheet, case)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let answers = lab.run_case(&sheets[*sheet], case, worker).map_err(|error| {
+                format!(
+                    "{}, chip rate {}, case {}: {error}",
+                    sheets[*sheet].name,
+                    sheets[*sheet].chip_rate,
+                    case.id()
+                )
+            })?;
+            answers.iter().for_each(&report);
+            outcomes.lock().expect("no worker panics with the lock").push((*sheet, case.id(), answers));
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..plan.workers).map(|w| scope.spawn(move || work(w))).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().expect("workers return their errors"))
+    })?;
+    let mut outcomes = outcomes.into_inner().expect("no worker panics with the lock");
+    let order = |sheet: usize, id: &str| jobs.iter().position(|(s, case)| *s == sheet && case.id() == id);
+    outcomes.sort_by_key(|(sheet, id, _)| order(*sheet, id));
+    Ok(outcomes.into_iter().flat_map(|(_, _, answers)| answers).collect())
+}
+
+struct Lab<'a> {
+    product: &'a Product,
+    folder: PathBuf,
+    seed: u64,
+}
+
+impl Lab<'_> {
+    fn key(&self) -> PathBuf {
+        self.folder.join("key.json")
+    }
+
+    fn pirates_key(&self) -> PathBuf {
+        self.folder.join("pirate.json")
+    }
+
+    /// Marks all maps at all chip rates, and lists what to do with them.
+    fn prepare(&self, plan: &Plan) -> Result<(Vec<Sheet>, Vec<Job>)> {
+        let mut maps = Vec::new();
+        for path in &plan.maps {
+            check_metres(path)?;
+            maps.push(Arc::new(noise::snap(&Map::read(path)?, PRECISION_M)));
+        }
+        let (mut sheets, mut jobs) = (Vec::new(), Vec::new());
+        for (number, (path, map)) in plan.maps.iter().zip(&maps).enumerate() {
+            let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let reference = self.folder.join(format!("{number}.gpkg"));
+            map.write(&reference)?;
+            let cases: Vec<Case> = all(foreign(&maps, number)?).into_iter().filter(&plan.wanted).collect();
+            let colludes = cases.iter().any(|case| matches!(case, Case::Collusion { .. }));
+            for &chip_rate in &plan.chip_rates {
+                let copies = (1..=if colludes { MOST_COPIES } else { 1 })
+                    .map(|copy| self.mark(&format!("{number}-{chip_rate}"), &reference, chip_rate, copy));
+                let copies = copies.collect::<Result<_>>()?;
+                jobs.extend(cases.iter().map(|case| (sheets.len(), case.clone())));
+                sheets.push(Sheet { name: name.clone(), chip_rate, reference: reference.clone(), copies });
+            }
+        }
+        Ok((sheets, jobs))
+    }
+
+    fn mark(&self, sheet: &str, reference: &Path, chip_rate: usize, copy: usize) -> Result<Copy> {
+        let recipient = format!("recipient {copy}");
+        let path = self.folder.join(format!("{sheet}-copy{copy}.gpkg"));
+        let record = path.with_extension("json");
+        let marking = Marking { key: &self.key(), recipient: &recipient, chip_rate, precision: PRECISION_M };
+        self.product.mark(reference, &path, &record, marking)?;
+        Ok(Copy { recipient, path, record })
+    }
+
+    /// Makes the suspect of a case and asks about everybody.
+    fn run_case(&self, sheet: &Sheet, case: &Case, worker: usize) -> Result<Vec<Outcome>> {
+        let folder = tempfile::Builder::new().prefix(&format!("worker{worker}-")).tempdir_in(&self.folder)?;
+        let suspect = folder.path().join("suspect.gpkg");
+        let seed = seed_of(self.seed, &sheet.name, &case.id());
+        let questions = self.make_suspect(sheet, case, seed, &suspect)?;
+        let mut outcomes = Vec::new();
+        for question in &questions {
+            for demodulator in ["paper", "joint"] {
+                let started = Instant::now();
+                let answer = self.ask(sheet, question, demodulator, &suspect);
+                let seconds = started.elapsed().as_secs_f64();
+                outcomes.push(outcome(sheet, case, seed, question, demodulator, answer, seconds));
+            }
+        }
+        Ok(outcomes)
+    }
+
+    fn make_suspect(&self, sheet: &Sheet, case: &Case, seed: u64, suspect: &Path) -> Result<Vec<Question>> {
+        let guilty = |copy: &Copy| self.question(sheet, &copy.recipient, true, Some(copy.record.clone()));
+        let [first, ..] = sheet.copies.as_slice() else { unreachable!("a sheet has a copy") };
+        match case {
+            Case::Attacked { row, .. } => {
+                row.attack.apply(&Map::read(&first.path)?, seed)?.write(suspect)?;
+                Ok(vec![guilty(first)])
+            }
+            Case::Unmarked => {
+                Map::read(&sheet.reference)?.write(suspect)?;
+                Ok(vec![Question { guilty: false, ..guilty(first) }])
+            }
+            Case::MarkedAgain => {
+                let record = suspect.with_extension("json");
+                let (key, recipient) = (self.pirates_key(), "pirate");
+                let marking =
+                    Marking { key: &key, recipient, chip_rate: sheet.chip_rate, precision: PRECISION_M };
+                self.product.mark(&first.path, suspect, &record, marking)?;
+                let pirate = Question {
+                    key,
+                    reference: first.path.clone(),
+                    ..self.question(sheet, recipient, true, Some(record))
+                };
+                Ok(vec![guilty(first), pirate])
+            }
+            Case::Collusion { copies } => {
+                let colluders = &sheet.copies[..*copies];
+                let maps = colluders.iter().map(|copy| Map::read(&copy.path)).collect::<Result<Vec<_>>>()?;
+                collusion::average(&maps)?.write(suspect)?;
+                let innocent = |i| self.question(sheet, &format!("innocent {i}"), false, None);
+                Ok(colluders.iter().map(guilty).chain((1..=INNOCENTS).map(innocent)).collect())
+            }
+        }
+    }
+
+    fn question(&self, sheet: &Sheet, asked: &str, guilty: bool, record: Option<PathBuf>) -> Question {
+        Question { asked: asked.into(), guilty, key: self.key(), reference: sheet.reference.clone(), record }
+    }
+
+    fn ask(&self, sheet: &Sheet, question: &Question, demodulator: &str, suspect: &Path) -> Result<Report> {
+        let asked = match &question.record {
+            Some(record) => Asked::Record(record),
+            None => Asked::Marking(Marking {
+                key: &question.key,
+                recipient: &question.asked,
+                chip_rate: sheet.chip_rate,
+                precision: PRECISION_M,
+            }),
+        };
+        self.product.verify(&question.key, &question.reference, asked, demodulator, suspect)
+    }
+}
+
+fn outcome(
+    sheet: &Sheet,
+    case: &Case,
+    seed: u64,
+    question: &Question,
+    demodulator: &'static str,
+    answer: Result<Report>,
+    seconds: f64,
+) -> Outcome {
+    let (report, failure) = match answer {
+        Ok(report) => (Some(report), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
+    let report = report.as_ref();
+    Outcome {
+        table: case.table(),
+        map: sheet.name.clone(),
+        chip_rate: sheet.chip_rate,
+        case: case.id(),
+        title: case.title(),
+        strength: case.strength(),
+        seed,
+        demodulator,
+        asked: question.asked.clone(),
+        guilty: question.guilty,
+        verdict: report.map(|r| r.verdict.clone()),
+        reason: failure.or(report.map(|r| r.reason.clone())).unwrap_or_default(),
+        bits: report.map_or(0, |r| r.bits.len()),
+        bit_errors: report.and_then(|r| r.bit_errors),
+        p_value_log10: report.and_then(|r| r.p_value_log10),
+        p_mark_log10: report.and_then(|r| r.p_mark_log10),
+        p_recipient_log10: report.and_then(|r| r.p_recipient_log10),
+        registration: report.map(|r| r.registration.method.clone()),
+        landmarks: report.map_or(0, |r| r.registration.landmarks),
+        rms_m: report.and_then(|r| r.registration.rms_m),
+        vertices_reference: report.map_or(0, |r| r.vertices.reference),
+        vertices_suspect: report.map_or(0, |r| r.vertices.suspect),
+        vertices_matched: report.map_or(0, |r| r.vertices.matched),
+        seconds,
+    }
+}
+
+/// The attacks' lengths are metres, so a map must be in metres, too.
+fn check_metres(path: &Path) -> Result<()> {
+    let dataset = gdal::Dataset::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let everything = Selection {
+        layers: None,
+        srs: None,
+        labels: LabelFields::None,
+        target: Target::Own,
+        most_vertices: MOST_VERTICES,
+        last_failure: &|| None,
+    };
+    let ground = survey(&dataset, &everything).and_then(|survey| survey.ground());
+    match ground.map_err(|e| format!("{}: {e}", path.display()))? {
+        Ground::Plane { metres_per_unit } if (metres_per_unit - 1.0).abs() < 0.01 => Ok(()),
+        _ => Err(format!("{} is not in metres: reproject it first", path.display()).into()),
+    }
+}
+
+/// The next map; for a single map its own mirror image.
+fn foreign(maps: &[Arc<Map>], number: usize) -> Result<Arc<Map>> {
+    match maps {
+        [only] => Ok(Arc::new(similarity::linear(only, similarity::mirror(), similarity::About::Centre)?)),
+        _ => Ok(maps[(number + 1) % maps.len()].clone()),
+    }
+}
+
+/// A seed for every map and case, whatever else is run (FNV-1a).
+fn seed_of(seed: u64, map: &str, case: &str) -> u64 {
+    let text = format!("{seed}/{map}/{case}");
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// An outcome on a map called "town"; `None` bit errors is a suspect that was not registered.
+    pub fn outcome(
+        id: &str,
+        chip_rate: usize,
+        demodulator: &'static str,
+        bit_errors: Option<usize>,
+    ) -> Outcome {
+        let verdict = if bit_errors.is_some_and(|errors| errors < 30) { "match" } else { "inconclusive" };
+        Outcome {
+            table: Table::Paper,
+            map: "town".into(),
+            chip_rate,
+            case: id.into(),
+            title: format!("attack {id}"),
+            strength: Some(0.5),
+            seed: 1,
+            demodulator,
+            asked: "recipient 1".into(),
+            guilty: true,
+            verdict: Some(verdict.into()),
+            reason: "so it is".into(),
+            bits: if bit_errors.is_some() { 128 } else { 0 },
+            bit_errors,
+            p_value_log10: bit_errors.map(|errors| errors as f64 - 30.0),
+            p_mark_log10: None,
+            p_recipient_log10: None,
+            registration: Some("landmarks".into()),
+            landmarks: 20,
+            rms_m: Some(0.1),
+            vertices_reference: 3000,
+            vertices_suspect: 3000,
+            vertices_matched: 2900,
+            seconds: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_seed_belongs_to_a_map_and_a_case() {
+        assert_eq!(seed_of(1, "a", "9c"), seed_of(1, "a", "9c"));
+        let seeds =
+            [seed_of(1, "a", "9c"), seed_of(2, "a", "9c"), seed_of(1, "b", "9c"), seed_of(1, "a", "9b")];
+        assert_eq!(crate::table2::summary::distinct(seeds.into_iter()).len(), 4);
+    }
+
+    #[test]
+    fn a_map_in_degrees_is_refused() {
+        let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/europe_deg.gpkg"));
+        assert!(check_metres(fixture).unwrap_err().to_string().contains("not in metres"));
+    }
+}

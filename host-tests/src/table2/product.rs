@@ -1,0 +1,176 @@
+//! The product as its users have it: the driver inside `ogr2ogr`, and the command `meshmark`.
+
+use super::Result;
+use meshmark_core::key::SecretKey;
+use serde::Deserialize;
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+/// A build of driver and command.
+#[derive(Debug, Clone)]
+pub struct Product {
+    meshmark: PathBuf,
+    plugins: PathBuf,
+}
+
+/// How a copy is marked.
+#[derive(Debug, Clone, Copy)]
+pub struct Marking<'a> {
+    pub key: &'a Path,
+    pub recipient: &'a str,
+    pub chip_rate: usize,
+    /// Grid of the output, CRS units.
+    pub precision: f64,
+}
+
+/// Who is asked about when a suspect is verified.
+#[derive(Debug, Clone, Copy)]
+pub enum Asked<'a> {
+    /// The copy of this record.
+    Record(&'a Path),
+    /// A copy marked like this.
+    Marking(Marking<'a>),
+}
+
+/// What `meshmark verify --json` prints, as far as it is used here.
+#[derive(Debug, Clone, Deserialize)]
+#[allow(missing_docs)] // the names are those of the report
+pub struct Report {
+    pub verdict: String,
+    pub reason: String,
+    pub bits: Vec<f64>,
+    pub bit_errors: Option<usize>,
+    pub p_value_log10: Option<f64>,
+    pub p_mark_log10: Option<f64>,
+    pub p_recipient_log10: Option<f64>,
+    pub registration: Registration,
+    pub vertices: Vertices,
+}
+
+/// How the suspect was brought onto the reference.
+#[derive(Debug, Clone, Deserialize)]
+#[allow(missing_docs)]
+pub struct Registration {
+    pub method: String,
+    pub landmarks: usize,
+    pub rms_m: Option<f64>,
+}
+
+/// Distinct vertices.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[allow(missing_docs)]
+pub struct Vertices {
+    pub reference: usize,
+    pub suspect: usize,
+    pub matched: usize,
+}
+
+impl Product {
+    /// The build in a folder: `meshmark` and `gdalplugins/ogr_MESHMARK.so`.
+    ///
+    /// # Errors
+    /// A sentence that says which of them is missing.
+    pub fn in_folder(folder: &Path) -> Result<Self> {
+        // GDAL looks for the driver from wherever the host runs.
+        let folder = folder.canonicalize().map_err(|e| format!("{}: {e}", folder.display()))?;
+        let product = Product { meshmark: folder.join("meshmark"), plugins: folder.join("gdalplugins") };
+        for file in [product.meshmark.clone(), product.plugins.join("ogr_MESHMARK.so")] {
+            if !file.is_file() {
+                return Err(format!("{} is not there: run `make build` first", file.display()).into());
+            }
+        }
+        Ok(product)
+    }
+
+    /// The build this program or test belongs to.
+    ///
+    /// # Errors
+    /// As [`Product::in_folder`].
+    pub fn of_this_build() -> Result<Self> {
+        let program = std::env::current_exe()?;
+        let folders: Vec<&Path> = program.ancestors().skip(1).collect();
+        let has_command = |folder: &&&Path| folder.join("meshmark").is_file();
+        Self::in_folder(folders.iter().find(has_command).unwrap_or(&folders[0]))
+    }
+
+    /// What `meshmark --version` says.
+    ///
+    /// # Errors
+    /// The command cannot be run.
+    pub fn version(&self) -> Result<String> {
+        let output = Command::new(&self.meshmark).arg("--version").output()?;
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_string())
+    }
+
+    /// Marks `source` as the driver does on export, with a record beside the marked GeoPackage.
+    ///
+    /// # Errors
+    /// What ogr2ogr prints.
+    pub fn mark(&self, source: &Path, marked: &Path, record: &Path, marking: Marking) -> Result<()> {
+        let mut command = Command::new("ogr2ogr");
+        command.env("GDAL_DRIVER_PATH", &self.plugins).args(["-q", "-f", "GPKG"]).arg(marked);
+        command.arg(format!("MESHMARK:{}", source.display()));
+        let options = [
+            ("KEY", marking.key.display().to_string()),
+            ("RECIPIENT", marking.recipient.into()),
+            ("CHIP_RATE", marking.chip_rate.to_string()),
+            ("PRECISION", marking.precision.to_string()),
+            ("RECORD", record.display().to_string()),
+        ];
+        for (name, value) in options {
+            command.arg("-oo").arg(format!("{name}={value}"));
+        }
+        let output = command.output().map_err(|e| format!("ogr2ogr cannot be run: {e}"))?;
+        match output.status.success() {
+            true => Ok(()),
+            false => Err(format!("marking {}: {}", source.display(), printed(&output)).into()),
+        }
+    }
+
+    /// Verifies a suspect, on one thread.
+    ///
+    /// # Errors
+    /// What `meshmark` prints when it gives no verdict.
+    pub fn verify(
+        &self,
+        key: &Path,
+        reference: &Path,
+        asked: Asked,
+        demodulator: &str,
+        suspect: &Path,
+    ) -> Result<Report> {
+        let mut command = Command::new(&self.meshmark);
+        command.env("RAYON_NUM_THREADS", "1").args(["verify", "--json", "--demodulator", demodulator]);
+        command.arg("--key").arg(key).arg("--reference").arg(reference);
+        match asked {
+            Asked::Record(record) => command.arg("--record").arg(record),
+            Asked::Marking(marking) => command
+                .args(["--recipient", marking.recipient])
+                .arg(format!("--chip-rate={}", marking.chip_rate))
+                .arg(format!("--precision={}", marking.precision)),
+        };
+        let output = command.arg(suspect).output()?;
+        // 0 match, 1 no match, 3 inconclusive; all others are no answer.
+        match output.status.code() {
+            Some(0 | 1 | 3) => Ok(serde_json::from_slice(&output.stdout)?),
+            code => Err(format!("meshmark verify, exit code {code:?}: {}", printed(&output)).into()),
+        }
+    }
+}
+
+fn printed(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).trim().to_string()
+}
+
+/// Writes a key file with a secret that is no secret: experiments must be repeatable.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_key(path: &Path, seed: u64) -> Result<()> {
+    let mut random = crate::attacks::Random::new(seed);
+    let mut secret = [0; 32];
+    secret.chunks_mut(8).for_each(|bytes| bytes.copy_from_slice(&random.seed().to_le_bytes()));
+    Ok(std::fs::write(path, SecretKey::from_bytes(secret).to_json().as_bytes())?)
+}
