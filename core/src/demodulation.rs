@@ -7,14 +7,15 @@
 use crate::{
     Result,
     carrier::{Carrier, bit_of_coefficient},
+    deformation::{Found, Observed, Prediction, factor},
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
     spectrum::Basis,
 };
 use faer::{
-    Mat, Side,
-    linalg::solvers::{Llt, Solve},
+    Mat, Par,
+    linalg::{solvers::Solve, triangular_solve::solve_lower_triangular_in_place},
 };
 use rayon::prelude::*;
 
@@ -90,23 +91,23 @@ fn ratio(a: f64, b: f64) -> f64 {
 pub fn paper(
     patches: &Patches,
     carrier: &Carrier,
-    observed: &[Option<[f64; 2]>],
+    observed: &Observed,
     bits: usize,
     parameters: &Parameters,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Demodulation> {
     let job = Job::new(patches, carrier, observed, bits, parameters, progress)?;
-    let sums = job.sum_over_patches(|basis, rows, displacement, chips| {
+    let sums = job.sum_over_patches(|_, basis, found, chips| {
         let carriers = job.carriers;
         let filled = |axis: usize| {
             let mut values = vec![0.0; basis.degrees.len()];
-            rows.iter().zip(displacement).for_each(|(&v, d)| values[v] = d[axis]);
+            found.rows.iter().enumerate().for_each(|(o, &v)| values[v] = found.moved[(o, axis)]);
             values
         };
         let correlations = [0, 1].map(|axis| basis.analyse(&filled(axis))[1..].to_vec());
         // The share of coefficient i that the found vertices pass on: (E⁻¹)_io E_oi.
         let share = |i: usize| {
-            let seen = rows.iter().map(|&v| basis.degrees[v] * basis.vectors[(v, i)].powi(2));
+            let seen = found.rows.iter().map(|&v| basis.degrees[v] * basis.vectors[(v, i)].powi(2));
             basis.norms_squared[i] * seen.sum::<f64>()
         };
         let shares: Vec<f64> = (1..=carriers).map(share).collect();
@@ -114,7 +115,7 @@ pub fn paper(
         for (i, share) in shares.iter().enumerate() {
             gram[(job.bit(i), 0)] += 2.0 * share;
         }
-        Sums::new(&job, gram, correlations, chips, 2.0 * shares.iter().sum::<f64>(), 0.0)
+        Sums::new(&job, gram, correlations, chips, 2.0 * shares.iter().sum::<f64>())
     })?;
     Ok(paper_estimate(&job, sums))
 }
@@ -140,76 +141,69 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     }
 }
 
-/// The joint detector: least squares over the vertices that were found, all bits at once,
-/// y_o = S_o b + ε with signatures S = α E diag(p) C; vertices that were not found are erasures.
-/// With G = Σ SᵀS / σ² and h = Σ Sᵀy / σ²: b̂ = (G + I)⁻¹ h, v = diag (G + I)⁻¹.
+/// The joint detector: all bits at once over the vertices that were found, y_o = S_o b + f_o + ε with signatures
+/// S = α E diag(p) C, a smooth deformation f and noise ε as `disturbance` describes them; vertices that were
+/// not found are erasures. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over patches and axes:
+/// b̂ = (G + I)⁻¹ h, v = diag (G + I)⁻¹.
 ///
-/// Arguments and errors are those of [`paper`].
+/// The other arguments and the errors are those of [`paper`].
 pub fn joint(
     patches: &Patches,
     carrier: &Carrier,
-    observed: &[Option<[f64; 2]>],
+    observed: &Observed,
     bits: usize,
     parameters: &Parameters,
+    disturbance: &Prediction,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Demodulation> {
     let job = Job::new(patches, carrier, observed, bits, parameters, progress)?;
-    let sums = job.sum_over_patches(|basis, rows, displacement, chips| {
-        let seen = Mat::from_fn(rows.len(), job.carriers, |o, i| basis.vectors[(rows[o], i + 1)]);
-        let moved = Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]);
+    let sums = job.sum_over_patches(|patch, basis, found, chips| {
+        if found.rows.is_empty() {
+            return Sums::nothing(&job);
+        }
+        let weights: Vec<f64> =
+            found.rows.iter().map(|&row| disturbance.weights[patch.vertices[row] as usize]).collect();
+        let factor = factor(&disturbance.deformation.matrix(&found.at, &weights));
+        let whiten = |mut matrix: Mat<f64>| {
+            solve_lower_triangular_in_place(factor.L(), matrix.as_mut(), Par::Seq);
+            matrix
+        };
+        let seen = whiten(Mat::from_fn(found.rows.len(), job.carriers, |o, i| {
+            basis.vectors[(found.rows[o], i + 1)]
+        }));
         let kernel = seen.transpose() * &seen;
-        let product = seen.transpose() * &moved;
-        let correlations =
-            [0, 1].map(|axis| (0..job.carriers).map(|i| product[(i, axis)]).collect::<Vec<f64>>());
+        let product = seen.transpose() * whiten(found.moved.clone());
+        let correlations = [0, 1].map(|axis| product.col_as_slice(axis).to_vec());
         let trace = 2.0 * (0..job.carriers).map(|i| kernel[(i, i)]).sum::<f64>();
-        let energy = displacement.iter().flatten().map(|d| d * d).sum();
-        Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace, energy)
+        Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
     })?;
-    Ok(joint_estimate(&job, sums))
-}
-
-/// Alternates between the message given the noise and the noise given the message.
-fn joint_estimate(job: &Job, sums: Sums) -> Demodulation {
-    let (m, amplitude_m) = (job.bits, job.parameters.amplitude_m);
-    let gram = Mat::from_fn(m, m, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
-    let product = Mat::from_fn(m, 1, |j, _| amplitude_m * sums.scores[j]);
-    let count = 2.0 * job.observed.iter().flatten().count() as f64;
-    let mut noise2 = (sums.energy / count.max(1.0)).max(LEAST_NOISE_M.powi(2));
-    let mut solution = posterior(&gram, &product, noise2);
-    for _ in 0..8 {
-        let (estimate, _) = &solution;
-        let explained = 2.0 * dot(estimate, product.col_as_slice(0));
-        let fitted = Mat::from_fn(m, 1, |j, _| estimate[j]);
-        let energy = (fitted.transpose() * &gram * &fitted)[(0, 0)];
-        let free = (count - m as f64).max(1.0);
-        noise2 = ((sums.energy - explained + energy) / free).max(LEAST_NOISE_M.powi(2));
-        solution = posterior(&gram, &product, noise2);
-    }
-    let (estimate, variance) = solution;
-    Demodulation {
+    let amplitude_m = parameters.amplitude_m;
+    let gram = Mat::from_fn(bits, bits, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
+    let product: Vec<f64> = sums.scores.iter().map(|q| amplitude_m * q).collect();
+    let (estimate, variance) = posterior(gram, &product);
+    Ok(Demodulation {
         estimate,
         variance,
         scores: sums.scores,
         chip_correlations: sums.correlations,
         expected_sum: amplitude_m * sums.trace,
-        noise_m: noise2.sqrt(),
-    }
+        noise_m: disturbance.deformation.noise_m,
+    })
 }
 
-/// (G/σ² + I)⁻¹ h/σ² and the diagonal of (G/σ² + I)⁻¹.
-fn posterior(gram: &Mat<f64>, product: &Mat<f64>, noise2: f64) -> (Vec<f64>, Vec<f64>) {
+/// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹.
+fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let m = gram.nrows();
-    let matrix = Mat::from_fn(m, m, |j, l| gram[(j, l)] / noise2 + f64::from(u8::from(j == l)));
-    let factor = Llt::new(matrix.as_ref(), Side::Lower).expect("a Gram matrix plus I is positive definite");
-    let inverse = factor.solve(Mat::<f64>::identity(m, m));
-    let estimate = &inverse * product;
-    ((0..m).map(|j| estimate[(j, 0)] / noise2).collect(), (0..m).map(|j| inverse[(j, j)]).collect())
+    (0..m).for_each(|j| gram[(j, j)] += 1.0);
+    let inverse = factor(&gram).solve(Mat::<f64>::identity(m, m));
+    let estimate = |j: usize| (0..m).map(|l| inverse[(j, l)] * product[l]).sum();
+    ((0..m).map(estimate).collect(), (0..m).map(|j| inverse[(j, j)]).collect())
 }
 
 struct Job<'a> {
     patches: &'a Patches,
     carrier: &'a Carrier,
-    observed: &'a [Option<[f64; 2]>],
+    observed: &'a Observed,
     bits: usize,
     /// m·c.
     carriers: usize,
@@ -219,13 +213,11 @@ struct Job<'a> {
 
 /// What the patches add up to.
 struct Sums {
-    /// m × m for `joint`, m × 1 for `paper`.
+    /// m × m for [`joint`], m × 1 for [`paper`].
     gram: Mat<f64>,
     scores: Vec<f64>,
     correlations: Vec<f64>,
     trace: f64,
-    /// Σ |y|².
-    energy: f64,
 }
 
 impl Sums {
@@ -235,7 +227,6 @@ impl Sums {
         correlations: [Vec<f64>; 2],
         chips: &[Vec<f64>; 2],
         trace: f64,
-        energy: f64,
     ) -> Self {
         let mut scores = vec![0.0; job.bits];
         for (chips, correlations) in chips.iter().zip(&correlations) {
@@ -243,7 +234,17 @@ impl Sums {
                 scores[job.bit(i)] += chip * correlation;
             }
         }
-        Sums { gram, scores, correlations: correlations.concat(), trace, energy }
+        Sums { gram, scores, correlations: correlations.concat(), trace }
+    }
+
+    /// What a patch of which nothing was found adds to the sums of [`joint`].
+    fn nothing(job: &Job) -> Self {
+        Sums {
+            gram: Mat::zeros(job.bits, job.bits),
+            scores: vec![0.0; job.bits],
+            correlations: vec![0.0; 2 * job.carriers],
+            trace: 0.0,
+        }
     }
 
     fn add(&mut self, other: Sums) {
@@ -251,7 +252,6 @@ impl Sums {
         self.scores.iter_mut().zip(other.scores).for_each(|(a, b)| *a += b);
         self.correlations.extend(other.correlations);
         self.trace += other.trace;
-        self.energy += other.energy;
     }
 }
 
@@ -259,7 +259,7 @@ impl<'a> Job<'a> {
     fn new(
         patches: &'a Patches,
         carrier: &'a Carrier,
-        observed: &'a [Option<[f64; 2]>],
+        observed: &'a Observed,
         bits: usize,
         parameters: &'a Parameters,
         progress: &'a (dyn Fn(usize) + Sync),
@@ -287,12 +287,12 @@ impl<'a> Job<'a> {
         gram
     }
 
-    /// Sums `f(basis, found rows, their displacements, chips)` over the patches. They are added up in blocks
+    /// Sums `f(patch, basis, found vertices, chips)` over the patches. They are added up in blocks
     /// whose size depends on the number of patches alone: the same sum for any number of threads,
     /// without holding a matrix for every patch.
     fn sum_over_patches(
         &self,
-        f: impl Fn(&Basis, &[usize], &[[f64; 2]], &[Vec<f64>; 2]) -> Sums + Sync,
+        f: impl Fn(&Patch, &Basis, &Found, &[Vec<f64>; 2]) -> Sums + Sync,
     ) -> Result<Sums> {
         let all = self.patches.as_slice();
         let block = all.len().div_ceil(64);
@@ -301,10 +301,8 @@ impl<'a> Job<'a> {
             for (offset, patch) in patches.iter().enumerate() {
                 let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
                 let chips = [0, 1].map(|a| self.carrier.chips(index * block + offset, a, self.carriers));
-                let found = patch.vertices.iter().enumerate();
-                let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) =
-                    found.filter_map(|(row, &v)| Some((row, self.observed[v as usize]?))).unzip();
-                let sums = f(&basis, &rows, &displacement, &chips);
+                let found = Found::new(self.patches, patch, self.observed);
+                let sums = f(patch, &basis, &found, &chips);
                 match &mut total {
                     None => total = Some(sums),
                     Some(total) => total.add(sums),

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use meshmark_core::{
-//!     carrier::Carrier, demodulation, embedding, ground::Ground, key::SecretKey,
+//!     carrier::Carrier, deformation::Deformation, demodulation, embedding, ground::Ground, key::SecretKey,
 //!     message::Message, options::Parameters, patches::Patches, vertices::VertexTable,
 //! };
 //! # fn main() -> Result<(), meshmark_core::Error> {
@@ -27,8 +27,9 @@
 //! let patches = Patches::new(&table, &ground, parameters.patch_size)?;
 //! let moved = table.coords().iter().zip(&marked.coords);
 //! let observed: Vec<_> = moved.map(|(r, s)| Some([s[0] - r[0], s[1] - r[1]])).collect();
+//! let disturbance = Deformation::none(0.01).predict(&patches, &observed, 256, parameters.amplitude_m);
 //! let found = demodulation::joint(
-//!     &patches, &Carrier::new(&key), &observed, message.len(), &parameters, &|_| ())?;
+//!     &patches, &Carrier::new(&key), &observed, message.len(), &parameters, &disturbance, &|_| ())?;
 //! assert_eq!(found.message(), message);
 //! # Ok(()) }
 //! ```
@@ -36,6 +37,7 @@
 #![warn(missing_docs)]
 
 pub mod carrier;
+pub mod deformation;
 pub mod demodulation;
 pub mod embedding;
 mod error;

@@ -17,7 +17,7 @@ pub struct Patch {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Patches {
     patches: Vec<Patch>,
-    vertices: usize,
+    positions_m: Vec<[f64; 2]>,
 }
 
 impl Patches {
@@ -34,7 +34,9 @@ impl Patches {
         let leaves = split(&points, points.len() / patch_size);
         let mut patches = with_edges(leaves, mesh.edges(), points.len());
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
-        Ok(Patches { patches, vertices: points.len() })
+        let [_, metres] = ground.metres_per_unit(table.centre());
+        let positions_m = points.iter().map(|p| p.map(|value| value * metres)).collect();
+        Ok(Patches { patches, positions_m })
     }
 
     /// The patches; the position of a patch is its number.
@@ -44,7 +46,12 @@ impl Patches {
 
     /// How many vertices the map has.
     pub fn vertex_count(&self) -> usize {
-        self.vertices
+        self.positions_m.len()
+    }
+
+    /// Where the vertices are, in canonical order, metres from the map's middle: for distances.
+    pub fn positions_m(&self) -> &[[f64; 2]] {
+        &self.positions_m
     }
 
     /// Checks that m·c coefficients besides the mean fit into the smallest patch.
@@ -61,7 +68,7 @@ impl Patches {
 
     /// Checks the invariants: every vertex in one patch, ascending, edges sorted, patches connected.
     pub fn validate(&self) -> std::result::Result<(), String> {
-        let mut seen = vec![false; self.vertices];
+        let mut seen = vec![false; self.positions_m.len()];
         for (number, patch) in self.patches.iter().enumerate() {
             if !patch.vertices.is_sorted_by(|a, b| a < b) || !patch.edges.is_sorted_by(|a, b| a < b) {
                 return Err(format!("patch {number} is not sorted"));

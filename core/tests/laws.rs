@@ -3,6 +3,7 @@
 use faer::Mat;
 use meshmark_core::{
     carrier::Carrier,
+    deformation::Deformation,
     demodulation::{self, Demodulation},
     embedding::embed,
     ground::Ground,
@@ -50,8 +51,17 @@ fn read_back(
 ) -> [Demodulation; 2] {
     let patches = Patches::new(table, ground, p.patch_size).unwrap();
     patches.validate().unwrap();
-    [demodulation::paper, demodulation::joint]
-        .map(|demodulate| demodulate(&patches, &Carrier::new(&key()), observed, 64, p, &|_| ()).unwrap())
+    let carrier = Carrier::new(&key());
+    let disturbance = Deformation::estimate(&patches, observed, 128, p).unwrap().predict(
+        &patches,
+        observed,
+        128,
+        p.amplitude_m,
+    );
+    [
+        demodulation::paper(&patches, &carrier, observed, 64, p, &|_| ()).unwrap(),
+        demodulation::joint(&patches, &carrier, observed, 64, p, &disturbance, &|_| ()).unwrap(),
+    ]
 }
 
 proptest! {

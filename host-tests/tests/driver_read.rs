@@ -81,7 +81,7 @@ fn the_message_can_be_read_from_what_ogr2ogr_wrote() {
     let parameters = record.parameters().unwrap();
     let carrier = Carrier::new(&host.key());
     let found =
-        demodulation::joint(&patches, &carrier, &observed, message.len(), &parameters, &|_| ()).unwrap();
+        demodulation::paper(&patches, &carrier, &observed, message.len(), &parameters, &|_| ()).unwrap();
     assert_eq!(found.message(), message);
     assert_eq!(message, host.key().recipient_message("ACME GmbH"));
 }

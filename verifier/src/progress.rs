@@ -31,7 +31,7 @@ impl Progress {
     }
 
     /// Steps done, callable from any thread.
-    pub fn stepper(&self) -> impl Fn(usize) + Sync {
+    pub fn stepper(&self) -> impl Fn(usize) + Sync + use<> {
         let bar = self.bar.clone();
         move |steps| bar.inc(steps as u64)
     }

@@ -11,7 +11,8 @@ use crate::{
 };
 use meshmark_core::{
     carrier::Carrier,
-    demodulation::{self, Demodulation},
+    deformation::{Deformation, Prediction},
+    demodulation,
     ground::Ground,
     key::SecretKey,
     message::Message,
@@ -117,15 +118,24 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
         return Ok(Report::new(request, &reference, registration, counts, None, decision, progress.finish()));
     }
 
+    progress.start("deformation", 0);
+    let carriers = request.bits * request.parameters.chip_rate;
+    let tracking = Tracking { reference: &reference, moved: &moved, ground: &ground, patches: &patches };
+    let (observed, disturbance) = tracking.follow(&matches, carriers, request)?;
+    let counts = VertexCounts { matched: observed.iter().flatten().count(), ..counts };
+
     progress.start("demodulation", patches.as_slice().len() as u64);
-    let observed = displacements(&reference, &moved, &matches, &ground);
-    let demodulate = match request.demodulator {
-        Demodulator::Paper => demodulation::paper,
-        Demodulator::Joint => demodulation::joint,
-    };
     let carrier = Carrier::new(&request.key);
-    let found: Demodulation =
-        demodulate(&patches, &carrier, &observed, request.bits, &request.parameters, &progress.stepper())?;
+    let (bits, parameters, step) = (request.bits, &request.parameters, progress.stepper());
+    let found = match request.demodulator {
+        Demodulator::Paper => {
+            let matched = tracking.displacements(&matches);
+            demodulation::paper(&patches, &carrier, &matched, bits, parameters, &step)?
+        }
+        Demodulator::Joint => {
+            demodulation::joint(&patches, &carrier, &observed, bits, parameters, &disturbance, &step)?
+        }
+    };
     let decision = decide(&found, request.expected.as_ref(), request.significance);
     Ok(Report::new(request, &reference, registration, counts, Some(&found), decision, progress.finish()))
 }
@@ -159,13 +169,52 @@ fn by_chance(
     matcher.all(&shifted, radius_m).count
 }
 
-/// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
-fn displacements(
-    reference: &Survey,
-    moved: &[[f64; 2]],
-    matches: &Matches,
-    ground: &Ground,
-) -> Vec<Option<[f64; 2]>> {
-    let pairs = reference.vertices.coords().iter().zip(&matches.suspect_of);
-    pairs.map(|(r, s)| s.map(|s| ground.metres_between(*r, moved[s as usize]))).collect()
+/// How often vertices are matched again around the predicted deformation.
+const ROUNDS: usize = 3;
+
+/// Follows a deformation that moved vertices out of the matching radius: matches give a deformation, the
+/// deformation says where to look for more matches. It never looks at the key, so decoys see the same.
+struct Tracking<'a> {
+    reference: &'a Survey,
+    moved: &'a [[f64; 2]],
+    ground: &'a Ground,
+    patches: &'a Patches,
+}
+
+impl Tracking<'_> {
+    fn follow(
+        &self,
+        matches: &Matches,
+        carriers: usize,
+        request: &Request,
+    ) -> Result<(Vec<Option<[f64; 2]>>, Prediction)> {
+        let mut observed = self.displacements(matches);
+        let mut round = 1;
+        loop {
+            let deformation = Deformation::estimate(self.patches, &observed, carriers, &request.parameters)?;
+            let amplitude_m = request.parameters.amplitude_m;
+            let prediction = deformation.predict(self.patches, &observed, carriers, amplitude_m);
+            if deformation.deviation_m == 0.0 || round == ROUNDS {
+                return Ok((observed, prediction));
+            }
+            observed = self.displacements(&self.match_around(&prediction, request.radius_m));
+            round += 1;
+        }
+    }
+
+    fn match_around(&self, prediction: &Prediction, radius_m: f64) -> Matches {
+        let shifted = |(p, d): (&[f64; 2], &[f64; 2])| {
+            let unit = self.ground.metres_per_unit(*p);
+            [p[0] + d[0] / unit[0], p[1] + d[1] / unit[1]]
+        };
+        let coords = self.reference.vertices.coords().iter();
+        let expected: Vec<[f64; 2]> = coords.zip(&prediction.displacement_m).map(shifted).collect();
+        Matcher::new(&expected, self.ground, self.reference.vertices.centre()).all(self.moved, radius_m)
+    }
+
+    /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
+    fn displacements(&self, matches: &Matches) -> Vec<Option<[f64; 2]>> {
+        let pairs = self.reference.vertices.coords().iter().zip(&matches.suspect_of);
+        pairs.map(|(r, s)| s.map(|s| self.ground.metres_between(*r, self.moved[s as usize]))).collect()
+    }
 }

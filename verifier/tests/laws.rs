@@ -2,6 +2,7 @@
 
 use meshmark_core::{
     carrier::Carrier,
+    deformation::Deformation,
     demodulation::{self, Demodulation},
     embedding::embed,
     ground::Ground,
@@ -75,7 +76,14 @@ impl Case {
         let observed: Vec<_> = pairs.map(metres).collect();
         let parameters = Parameters::default();
         let patches = Patches::new(&self.reference, &self.ground, parameters.patch_size).unwrap();
-        demodulation::joint(&patches, &Carrier::new(key), &observed, 128, &parameters, &|_| ()).unwrap()
+        let disturbance = Deformation::estimate(&patches, &observed, 256, &parameters).unwrap().predict(
+            &patches,
+            &observed,
+            256,
+            parameters.amplitude_m,
+        );
+        let carrier = Carrier::new(key);
+        demodulation::joint(&patches, &carrier, &observed, 128, &parameters, &disturbance, &|_| ()).unwrap()
     }
 
     fn decide(&self, found: &Demodulation, message: &Message) -> Decision {

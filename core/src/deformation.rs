@@ -1,0 +1,338 @@
+//! What happened to the suspect besides the mark, estimated without the key: a smooth deformation (rubber
+//! sheeting, digitising, a projection guessed wrong) and noise. In GIS words, kriging of the displacements.
+//!
+//! The displacement of a vertex is deformation + mark + noise. The deformation is a Gaussian process
+//! with a Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine Learning*,
+//! 2006, eq. 4.17) and a free shift of every patch. Nothing here knows the chips: the tested key and every
+//! decoy see the same estimate.
+
+use crate::{
+    Result,
+    options::Parameters,
+    patches::{Patch, Patches},
+    spectrum::Basis,
+};
+use faer::{
+    Mat, Side,
+    linalg::solvers::{Llt, Solve},
+};
+use rayon::prelude::*;
+
+/// Displacement of every reference vertex in canonical order, metres, or `None` where it was not found.
+pub type Observed = [Option<[f64; 2]>];
+
+/// Standard deviation of the shift of a whole patch, metres: as good as free.
+const SHIFT_M: f64 = 1.0;
+/// Patches, and vertices of each, on which the hyper-parameters are estimated.
+const SAMPLE_PATCHES: usize = 6;
+const SAMPLE_VERTICES: usize = 200;
+/// Fewer found vertices say nothing about a patch.
+const LEAST_FOUND: usize = 30;
+/// A residual of more standard deviations than this weighs less (Huber 1964).
+const HUBER: f64 = 2.0;
+/// What a deformation must gain in log-likelihood to be believed.
+const WORTH_IT: f64 = 10.0;
+
+const DEVIATIONS_M: [f64; 6] = [0.06, 0.12, 0.25, 0.5, 1.0, 2.0];
+const RANGES_M: [f64; 6] = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0];
+const NOISES_M: [f64; 9] = [0.01, 0.03, 0.06, 0.1, 0.16, 0.25, 0.35, 0.5, 0.8];
+
+/// Hyper-parameters of the displacement, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deformation {
+    /// σ_f, standard deviation of the deformation; 0 where there is none.
+    pub deviation_m: f64,
+    /// ℓ, the distance over which it changes.
+    pub range_m: f64,
+    /// σ, standard deviation of the noise.
+    pub noise_m: f64,
+}
+
+/// The deformation itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Its hyper-parameters.
+    pub deformation: Deformation,
+    /// Of every reference vertex in canonical order, found or not, metres.
+    pub displacement_m: Vec<[f64; 2]>,
+    /// Of every reference vertex: 1, or less where its displacement does not fit in with the others.
+    pub weights: Vec<f64>,
+}
+
+impl Deformation {
+    /// Noise alone.
+    pub fn none(noise_m: f64) -> Self {
+        Deformation { deviation_m: 0.0, range_m: 1.0, noise_m }
+    }
+
+    /// The hyper-parameters of greatest marginal likelihood on a few patches. The mark enters with its
+    /// covariance over all chips and messages, α² E Eᵀ. `carriers` is m·c.
+    ///
+    /// # Errors
+    /// [`crate::Error::NoConvergence`].
+    pub fn estimate(
+        patches: &Patches,
+        observed: &Observed,
+        carriers: usize,
+        parameters: &Parameters,
+    ) -> Result<Self> {
+        let found = |p: &&Patch| p.vertices.iter().filter(|&&v| observed[v as usize].is_some()).count();
+        let known: Vec<&Patch> = patches.as_slice().iter().filter(|p| found(p) >= LEAST_FOUND).collect();
+        let step = known.len().div_ceil(SAMPLE_PATCHES).max(1);
+        let chosen: Vec<&Patch> = known.into_iter().step_by(step).collect();
+        let sample = |patch: &&Patch| Sample::new(patches, patch, observed, carriers, parameters);
+        let samples: Vec<Sample> = chosen.par_iter().map(sample).collect::<Result<_>>()?;
+        Ok(most_likely(|candidate| {
+            let each: Vec<f64> = samples.par_iter().map(|s| s.log_likelihood(candidate)).collect();
+            each.iter().sum()
+        }))
+    }
+
+    /// Predicts the deformation from what was observed. The mark counts as noise here, so no spectrum
+    /// is needed.
+    pub fn predict(
+        &self,
+        patches: &Patches,
+        observed: &Observed,
+        carriers: usize,
+        amplitude_m: f64,
+    ) -> Prediction {
+        let predict = |patch: &Patch| {
+            let mark2 = amplitude_m.powi(2) * carriers as f64 / patch.vertices.len() as f64;
+            let with_mark = Deformation { noise_m: (self.noise_m.powi(2) + mark2).sqrt(), ..*self };
+            Kriging::new(with_mark, Found::new(patches, patch, observed)).predict(patches, patch)
+        };
+        let predicted: Vec<PatchPrediction> = patches.as_slice().par_iter().map(predict).collect();
+        let mut all = Prediction {
+            deformation: *self,
+            displacement_m: vec![[0.0; 2]; observed.len()],
+            weights: vec![1.0; observed.len()],
+        };
+        for (patch, part) in patches.as_slice().iter().zip(predicted) {
+            for (&v, displacement) in patch.vertices.iter().zip(part.displacement_m) {
+                all.displacement_m[v as usize] = displacement;
+            }
+            for (row, weight) in part.rows.into_iter().zip(part.weights) {
+                all.weights[patch.vertices[row] as usize] = weight;
+            }
+        }
+        all
+    }
+
+    /// σ_f² k(d / ℓ), Matérn 5/2.
+    fn covariance(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
+        let d = 5f64.sqrt() * (a[0] - b[0]).hypot(a[1] - b[1]) / self.range_m;
+        self.deviation_m.powi(2) * (1.0 + d + d * d / 3.0) * (-d).exp()
+    }
+
+    /// Covariance of deformation, shift and noise over found vertices, o × o (its lower triangle: the
+    /// factorisation reads no more); weights divide the noise.
+    pub(crate) fn matrix(&self, at: &[[f64; 2]], weights: &[f64]) -> Mat<f64> {
+        Mat::from_fn(at.len(), at.len(), |i, j| {
+            let noise = if i == j { self.noise_m.powi(2) / weights[i] } else { 0.0 };
+            let smooth = if self.deviation_m > 0.0 && i >= j { self.covariance(at[i], at[j]) } else { 0.0 };
+            SHIFT_M.powi(2) + smooth + noise
+        })
+    }
+}
+
+/// The Cholesky factor of a covariance with noise.
+pub(crate) fn factor(covariance: &Mat<f64>) -> Llt<f64> {
+    Llt::new(covariance.as_ref(), Side::Lower).expect("a covariance with noise is positive definite")
+}
+
+/// The vertices of a patch that were found.
+pub(crate) struct Found {
+    /// Their positions in the patch.
+    pub rows: Vec<usize>,
+    /// Their places, metres.
+    pub at: Vec<[f64; 2]>,
+    /// Their displacements, o × 2, metres.
+    pub moved: Mat<f64>,
+}
+
+impl Found {
+    pub fn new(patches: &Patches, patch: &Patch, observed: &Observed) -> Self {
+        let all = patch.vertices.iter().enumerate();
+        let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) =
+            all.filter_map(|(row, &v)| Some((row, observed[v as usize]?))).unzip();
+        let at = rows.iter().map(|&row| patches.positions_m()[patch.vertices[row] as usize]).collect();
+        Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
+    }
+}
+
+/// Kriging within one patch.
+struct Kriging {
+    deformation: Deformation,
+    found: Found,
+    weights: Vec<f64>,
+    /// Σ⁻¹ y, o × 2.
+    solved: Mat<f64>,
+}
+
+struct PatchPrediction {
+    displacement_m: Vec<[f64; 2]>,
+    rows: Vec<usize>,
+    weights: Vec<f64>,
+}
+
+impl Kriging {
+    /// Alternates between the deformation and the weights of what does not fit it.
+    fn new(deformation: Deformation, found: Found) -> Self {
+        let mut weights = vec![1.0; found.rows.len()];
+        let mut solved = Mat::zeros(found.rows.len(), 2);
+        for _ in 0..if found.rows.is_empty() { 0 } else { 3 } {
+            solved = factor(&deformation.matrix(&found.at, &weights)).solve(&found.moved);
+            for (o, weight) in weights.iter_mut().enumerate() {
+                // The residual is y − f̂ = (σ² / w) Σ⁻¹ y.
+                let residual_m = solved[(o, 0)].hypot(solved[(o, 1)]) * deformation.noise_m.powi(2) / *weight;
+                *weight = (HUBER * deformation.noise_m / residual_m).min(1.0);
+            }
+        }
+        Kriging { deformation, found, weights, solved }
+    }
+
+    fn predict(self, patches: &Patches, patch: &Patch) -> PatchPrediction {
+        let total = |axis: usize| (0..self.found.rows.len()).map(|o| self.solved[(o, axis)]).sum::<f64>();
+        let shift = [0, 1].map(|axis| SHIFT_M.powi(2) * total(axis));
+        let at_vertex = |&v: &u32| {
+            if self.deformation.deviation_m == 0.0 {
+                return shift;
+            }
+            let here = patches.positions_m()[v as usize];
+            self.found.at.iter().enumerate().fold(shift, |sum, (o, &there)| {
+                let k = self.deformation.covariance(here, there);
+                [sum[0] + k * self.solved[(o, 0)], sum[1] + k * self.solved[(o, 1)]]
+            })
+        };
+        let displacement_m = patch.vertices.iter().map(at_vertex).collect();
+        PatchPrediction { displacement_m, rows: self.found.rows, weights: self.weights }
+    }
+}
+
+/// One patch as the likelihood needs it.
+struct Sample {
+    at: Vec<[f64; 2]>,
+    /// o × 2.
+    moved: Mat<f64>,
+    /// α² E_o E_oᵀ, o × o.
+    mark: Mat<f64>,
+}
+
+impl Sample {
+    fn new(
+        patches: &Patches,
+        patch: &Patch,
+        observed: &Observed,
+        carriers: usize,
+        parameters: &Parameters,
+    ) -> Result<Self> {
+        let mut found = Found::new(patches, patch, observed);
+        found.rows.truncate(SAMPLE_VERTICES); // neighbours in x: short distances are what ℓ is read from
+        found.at.truncate(SAMPLE_VERTICES);
+        let basis = Basis::low_frequencies(patch, carriers + 1)?;
+        let count = found.rows.len();
+        let signatures = Mat::from_fn(count, carriers, |o, i| {
+            parameters.amplitude_m * basis.vectors[(found.rows[o], i + 1)]
+        });
+        let moved = found.moved.subrows(0, count).to_owned();
+        Ok(Sample { at: found.at, moved, mark: &signatures * signatures.transpose() })
+    }
+
+    /// log p(y) of both axes, but for a constant.
+    fn log_likelihood(&self, candidate: &Deformation) -> f64 {
+        let count = self.at.len();
+        let factor = factor(&(candidate.matrix(&self.at, &vec![1.0; count]) + &self.mark));
+        let half_log_determinant: f64 = (0..count).map(|i| factor.L()[(i, i)].ln()).sum();
+        let solved = factor.solve(&self.moved);
+        let axis = |a: usize| (0..count).map(|i| self.moved[(i, a)] * solved[(i, a)]).sum::<f64>();
+        -2.0 * half_log_determinant - (axis(0) + axis(1)) / 2.0
+    }
+}
+
+/// Coordinate ascent over the grid of values, with a deformation and without one.
+fn most_likely(log_likelihood: impl Fn(&Deformation) -> f64) -> Deformation {
+    let best_of = |candidates: &mut dyn Iterator<Item = Deformation>| {
+        let scored = candidates.map(|candidate| (log_likelihood(&candidate), candidate));
+        scored.reduce(|best, next| if next.0 > best.0 { next } else { best }).expect("candidates")
+    };
+    let still = best_of(&mut NOISES_M.iter().map(|&noise_m| Deformation::none(noise_m)));
+    let start = Deformation { deviation_m: 0.25, range_m: 20.0, noise_m: still.1.noise_m };
+    let mut best = (f64::NEG_INFINITY, start);
+    loop {
+        let before = best.0;
+        let now = best.1;
+        best = best_of(&mut RANGES_M.iter().map(|&range_m| Deformation { range_m, ..now }));
+        let now = best.1;
+        best = best_of(&mut DEVIATIONS_M.iter().map(|&deviation_m| Deformation { deviation_m, ..now }));
+        let now = best.1;
+        best = best_of(&mut NOISES_M.iter().map(|&noise_m| Deformation { noise_m, ..now }));
+        if best.0 <= before {
+            break;
+        }
+    }
+    if best.0 > still.0 + WORTH_IT { best.1 } else { still.1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ground::Ground, vertices::VertexTable};
+
+    /// 600 scattered vertices on 300 m × 300 m in two patches.
+    fn patches() -> Patches {
+        let hash = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29) % 300_000;
+        let coords = (0..600).map(|i| [hash(i) as f64 / 1e3, hash(i + 7777) as f64 / 1e3]).collect();
+        let table = VertexTable::new(coords).unwrap();
+        Patches::new(&table, &Ground::Plane { metres_per_unit: 1.0 }, 300).unwrap()
+    }
+
+    fn wave([x, y]: [f64; 2]) -> [f64; 2] {
+        [0.8 * (x / 40.0).sin(), 0.8 * (y / 40.0).cos()]
+    }
+
+    /// The wave at two vertices of three, with a centimetre of noise.
+    fn observed(patches: &Patches) -> Vec<Option<[f64; 2]>> {
+        let noise = |i: usize| ((i * 7919) % 101) as f64 / 101.0 * 0.03 - 0.015;
+        let each = patches.positions_m().iter().enumerate();
+        each.map(|(i, p)| (i % 3 > 0).then(|| [wave(*p)[0] + noise(i), wave(*p)[1] - noise(i)])).collect()
+    }
+
+    #[test]
+    fn a_smooth_deformation_is_found_and_predicted_where_nothing_was_observed() {
+        let patches = patches();
+        let observed = observed(&patches);
+        let parameters = Parameters { amplitude_m: 0.001, ..Parameters::default() };
+        let found = Deformation::estimate(&patches, &observed, 64, &parameters).unwrap();
+        assert!(found.deviation_m >= 0.25 && found.range_m >= 20.0, "{found:?}");
+        let prediction = found.predict(&patches, &observed, 64, parameters.amplitude_m);
+        let miss = |i: usize| {
+            let (a, b) = (prediction.displacement_m[i], wave(patches.positions_m()[i]));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        };
+        let mut misses: Vec<f64> = (0..600).step_by(3).map(miss).collect();
+        misses.sort_by(f64::total_cmp);
+        assert!(misses[100] < 0.03 && misses[190] < 0.2, "{} {}", misses[100], misses[190]);
+    }
+
+    #[test]
+    fn noise_is_not_taken_for_a_deformation() {
+        let patches = patches();
+        let random = |i: u64| (i.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / 2f64.powi(53) - 0.5;
+        let observed: Vec<_> = (0..600).map(|i| Some([random(2 * i + 1), random(2 * i + 2)])).collect();
+        let found = Deformation::estimate(&patches, &observed, 64, &Parameters::default()).unwrap();
+        assert_eq!(found.deviation_m, 0.0);
+        assert!((0.16..0.5).contains(&found.noise_m), "{found:?}"); // uniform ±0.5 m: 0.29 m
+    }
+
+    #[test]
+    fn a_vertex_that_does_not_fit_weighs_less() {
+        let patches = patches();
+        let mut observed = observed(&patches);
+        observed[301] = observed[301].map(|[x, y]| [x + 0.7, y - 0.7]);
+        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 0.02 };
+        let prediction = deformation.predict(&patches, &observed, 64, 0.001);
+        assert!(prediction.weights[301] < 0.2, "{}", prediction.weights[301]);
+        assert!(prediction.weights.iter().filter(|w| **w == 1.0).count() > 500);
+    }
+}
