@@ -49,7 +49,8 @@ fn the_message_is_read_from_every_common_format() {
         // GeoJSON and a FlatGeobuf file hold one layer.
         let one_layer = ["-oo", "LAYERS=buildings", "-oo", "RECORD=acme.json", "buildings"];
         let all = ["-oo", "RECORD=acme.json"];
-        let options: &[&str] = if output.contains(".geojson") || output.contains(".fgb") { &one_layer } else { &all };
+        let options: &[&str] =
+            if output.contains(".geojson") || output.contains(".fgb") { &one_layer } else { &all };
         host.mark(format, output, "map.gpkg", options).succeeds();
         matches(&host, "map.gpkg", &["--record", "acme.json", output]);
     }
@@ -105,10 +106,12 @@ fn a_translated_rotated_scaled_copy_is_found_by_its_landmarks() {
     let host = marked("helsinki.gpkg", &[]);
     let map = Map::read(&host.path("marked.gpkg")).unwrap();
     let turned = similarity::linear(&map, similarity::rotation(45.0), similarity::About::Corner).unwrap();
-    let scaled = similarity::linear(&turned, similarity::scaling(5.5, 5.5), similarity::About::Corner).unwrap();
+    let scaled =
+        similarity::linear(&turned, similarity::scaling(5.5, 5.5), similarity::About::Corner).unwrap();
     similarity::translate(&scaled, [1000.0, -500.0]).write(&host.path("moved.gpkg")).unwrap();
     for landmark in [&[][..], &["--landmark", "name", "--landmark", "osm_id"][..]] {
-        let report = matches(&host, "map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
+        let report =
+            matches(&host, "map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
         assert_eq!(report["registration"]["method"], "landmarks");
         assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
         assert!(report["registration"]["rms_m"].as_f64().unwrap() < 0.12);
