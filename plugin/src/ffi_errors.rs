@@ -122,3 +122,44 @@ unsafe extern "C" fn collect(class: CPLErr::Type, number: CPLErrorNum, message: 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_one_failure_and_the_given_value() {
+        let collector = Collector::new();
+        let value = guarded(7, || panic!("no patch has {} vertices", 3));
+        let caught = collector.0.borrow();
+        assert_eq!((value, caught.len()), (7, 1));
+        assert!(caught[0].message.contains("no patch has 3 vertices"));
+        assert_eq!(caught[0].class, CPLErr::CE_Failure);
+    }
+
+    #[test]
+    fn collected_errors_are_emitted_only_when_released() {
+        let outer = Collector::new();
+        let inner = Collector::new();
+        report(CPLErr::CE_Warning, "careful");
+        report(CPLErr::CE_Failure, "broken");
+        report(CPLErr::CE_Failure, "still broken");
+        assert_eq!(inner.first_failure().as_deref(), Some("broken"));
+        assert!(outer.0.borrow().is_empty());
+        inner.release();
+        let messages: Vec<_> = outer.0.borrow().iter().map(|e| e.message.clone()).collect();
+        assert_eq!(messages, ["careful", "broken", "still broken"]);
+
+        let dropped = Collector::new();
+        report(CPLErr::CE_Failure, "forgotten");
+        drop(dropped);
+        assert_eq!(outer.0.borrow().len(), 3);
+    }
+
+    #[test]
+    fn a_message_with_a_percent_sign_or_a_nul_is_emitted_as_text() {
+        let collector = Collector::new();
+        report(CPLErr::CE_Failure, "100 %s\0 sure");
+        assert_eq!(collector.first_failure().as_deref(), Some("100 %s  sure"));
+    }
+}

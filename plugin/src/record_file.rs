@@ -55,3 +55,27 @@ fn folder(path: &Path) -> &Path {
         _ => Path::new("."),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_is_written_once_and_never_over_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("record.json");
+        write(&path, "one").unwrap();
+        write(&path, "one").unwrap();
+        assert!(matches!(write(&path, "two"), Err(Error::RecordDiffers { .. })));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "one");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary is left");
+    }
+
+    #[test]
+    fn a_record_without_a_folder_goes_into_the_current_one() {
+        assert_eq!(folder(Path::new("record.json")), Path::new("."));
+        assert!(check_folder(Path::new("record.json")).is_ok());
+        assert!(check_folder(Path::new("no/such/folder/record.json")).is_err());
+        assert!(check_folder(Path::new("/")).is_err());
+    }
+}

@@ -194,3 +194,71 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 fn open_sources() -> MutexGuard<'static, Vec<OpenSource>> {
     OPEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tempfile::TempDir;
+
+    fn folder_with(names: &[&str]) -> (TempDir, Vec<PathBuf>) {
+        let folder = tempfile::tempdir().unwrap();
+        let paths: Vec<_> = names.iter().map(|name| folder.path().join(name)).collect();
+        paths.iter().for_each(|path| fs::write(path, "map").unwrap());
+        (folder, paths)
+    }
+
+    #[test]
+    fn a_write_a_replacement_and_a_transaction_are_changes() {
+        let (folder, paths) = folder_with(&["map.gpkg"]);
+        let journal = folder.path().join("map.gpkg-journal");
+        let files = SourceFiles::watch(paths.clone());
+        assert!(files.check().is_ok());
+        fs::write(&journal, "pages").unwrap();
+        assert!(files.check().is_err());
+        fs::remove_file(&journal).unwrap();
+        assert!(files.check().is_ok());
+        fs::write(folder.path().join("new"), "map").unwrap();
+        fs::rename(folder.path().join("new"), &paths[0]).unwrap();
+        assert!(files.check().is_err(), "the same bytes in another file");
+    }
+
+    #[test]
+    fn only_open_sources_are_being_read() {
+        let (folder, paths) = folder_with(&["map.shp", "map.dbf"]);
+        let files = SourceFiles::watch(paths.clone());
+        assert!(paths.iter().all(|path| is_being_read(path)) && is_being_read(folder.path()));
+        assert!(files.contain(&folder.path().join("../").join(&paths[1])));
+        drop(files);
+        assert!(!paths.iter().any(|path| is_being_read(path)) && !is_being_read(folder.path()));
+    }
+
+    #[test]
+    fn a_file_alone_does_not_claim_its_folder() {
+        let (folder, paths) = folder_with(&["map.gpkg"]);
+        let _files = SourceFiles::watch(paths);
+        assert!(!is_being_read(folder.path()));
+    }
+
+    #[test]
+    fn copies_stay_only_if_the_source_was_lost() {
+        let (folder, paths) = folder_with(&["map.tab", "map.dat"]);
+        let saved = |name: &str| fs::read_to_string(folder.path().join(name)).ok();
+
+        let files = SourceFiles::watch(paths.clone());
+        save_copies(&paths[1]).unwrap();
+        assert_eq!(saved("map.tab.saved").as_deref(), Some("map"));
+        drop(files);
+        assert_eq!(saved("map.tab.saved"), None);
+
+        fs::write(folder.path().join("map.dat.saved"), "of another day").unwrap();
+        let files = SourceFiles::watch(paths.clone());
+        save_copies(&paths[0]).unwrap();
+        fs::write(&paths[0], "").unwrap();
+        let error = files.check().unwrap_err().to_string();
+        assert!(error.contains("map.tab.saved") && error.contains("map.dat.saved2"), "{error}");
+        drop(files);
+        assert_eq!(saved("map.tab.saved").as_deref(), Some("map"));
+        assert_eq!(saved("map.dat.saved2").as_deref(), Some("map"));
+        assert_eq!(saved("map.dat.saved").as_deref(), Some("of another day"));
+    }
+}
