@@ -1,8 +1,8 @@
 //! Labels: attribute texts with the place they stand for, from which a verifier makes landmarks.
 
 use crate::survey::LabelFields;
-use gdal::vector::{Feature, FieldValue, Geometry};
-use geo::{Centroid, HasDimensions, dimensions::Dimensions};
+use gdal::vector::{Feature, FieldValue};
+use geo::{Centroid, Geometry, HasDimensions, dimensions::Dimensions};
 
 /// What kind of place a label has. Lines are the least certain: they are cut and merged by others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +26,13 @@ pub struct Label {
     pub dimension: Dimension,
 }
 
-/// The labels of one feature.
-pub(crate) fn of_feature(feature: &Feature, fields: &LabelFields, labels: &mut Vec<Label>) {
+/// The labels of one feature, and where they are.
+pub(crate) fn of_feature(
+    feature: &Feature,
+    geometry: &Geometry,
+    fields: &LabelFields,
+    labels: &mut Vec<Label>,
+) {
     let values: Vec<String> = feature
         .fields()
         .filter(|(name, _)| fields.wants(name))
@@ -36,8 +41,7 @@ pub(crate) fn of_feature(feature: &Feature, fields: &LabelFields, labels: &mut V
     if values.is_empty() {
         return;
     }
-    // A null geometry is an error here; `Feature::geometry` would hand out a null pointer.
-    let Some((point, dimension)) = feature.geometry_by_index(0).ok().and_then(place) else { return };
+    let Some((point, dimension)) = place(geometry) else { return };
     labels.extend(values.into_iter().map(|value| Label { value, point, dimension }));
 }
 
@@ -52,10 +56,6 @@ fn text(value: FieldValue) -> Option<String> {
 }
 
 fn place(geometry: &Geometry) -> Option<([f64; 2], Dimension)> {
-    if geometry.is_empty() {
-        return None;
-    }
-    let geometry = geometry.to_geo().ok()?; // curves have no counterpart in geo and give no label
     let dimension = match geometry.dimensions() {
         Dimensions::Empty => return None,
         Dimensions::ZeroDimensional => Dimension::Point,

@@ -6,12 +6,14 @@
 mod crs;
 mod error;
 mod labels;
+mod shapes;
 mod survey;
 pub mod wkb;
 
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
 pub use labels::{Dimension, Label};
+pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
 

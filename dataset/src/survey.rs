@@ -1,16 +1,16 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
-use crate::{CoordinateSystem, Error, Label, Result, crs, labels, parse_srs, wkb};
+use crate::{CoordinateSystem, Error, Label, Result, Shape, crs, labels, parse_srs, shapes, wkb};
 use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{ground::Ground, vertices::VertexTable};
 
-/// Which attributes become labels.
+/// Which attributes become labels. With labels come shapes: both are for registration.
 #[derive(Debug, Clone, Copy)]
 pub enum LabelFields<'a> {
-    /// None: only the geometry is wanted.
+    /// None, and no shapes: only the vertices are wanted.
     None,
     /// Every string and integer field.
     All,
@@ -68,6 +68,8 @@ pub struct Survey {
     ground: Option<Ground>,
     /// Attribute texts and their places.
     pub labels: Vec<Label>,
+    /// Rings and lines.
+    pub shapes: Vec<Shape>,
 }
 
 impl Survey {
@@ -87,7 +89,7 @@ impl Survey {
 /// that are not finite, a CRS in which metres mean nothing.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let names = layer_names(dataset, selection.layers)?;
-    let mut walk = Walk { selection, crs: None, coords: Vec::new(), labels: Vec::new() };
+    let mut walk = Walk { selection, crs: None, coords: Vec::new(), labels: Vec::new(), shapes: Vec::new() };
     for name in &names {
         walk.layer(&mut dataset.layer_by_name(name)?, name)?;
     }
@@ -101,7 +103,7 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
-    Ok(Survey { vertices, crs, ground, labels: walk.labels })
+    Ok(Survey { vertices, crs, ground, labels: walk.labels, shapes: walk.shapes })
 }
 
 /// The names of the chosen layers, in the dataset's order.
@@ -123,12 +125,13 @@ struct Walk<'a> {
     crs: Option<(String, Option<CoordinateSystem>)>,
     coords: Vec<[f64; 2]>,
     labels: Vec<Label>,
+    shapes: Vec<Shape>,
 }
 
 impl Walk<'_> {
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<()> {
         let columns = self.columns(layer)?;
-        let first_label = self.labels.len();
+        let (first_label, first_shape) = (self.labels.len(), self.shapes.len());
         let mut of_column: Vec<Vec<[f64; 2]>> = vec![Vec::new(); columns.len()];
         for feature in layer.features() {
             for (column, coords) in of_column.iter_mut().enumerate() {
@@ -138,9 +141,7 @@ impl Walk<'_> {
             if vertices > self.selection.most_vertices {
                 return Err(Error::TooLarge { most: self.selection.most_vertices });
             }
-            if !matches!(self.selection.labels, LabelFields::None) {
-                labels::of_feature(&feature, &self.selection.labels, &mut self.labels);
-            }
+            self.describe(&feature);
         }
         if let Some(reason) = (self.selection.last_failure)() {
             return Err(Error::Unreadable { layer: name.into(), reason });
@@ -158,8 +159,26 @@ impl Walk<'_> {
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             reproject(&mut points, crs.as_ref(), target, name)?;
             labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
+            for shape in &mut self.shapes[first_shape..] {
+                reproject(&mut shape.vertices, crs.as_ref(), target, name)?;
+            }
         }
         Ok(())
+    }
+
+    /// Labels and shapes of a feature. Curves have no counterpart in geo and give none.
+    fn describe(&mut self, feature: &Feature) {
+        if matches!(self.selection.labels, LabelFields::None) {
+            return;
+        }
+        // A null geometry is an error here; `Feature::geometry` would hand out a null pointer.
+        let Ok(geometry) = feature.geometry_by_index(0) else { return };
+        if geometry.is_empty() {
+            return;
+        }
+        let Ok(geometry) = geometry.to_geo() else { return };
+        labels::of_feature(feature, &geometry, &self.selection.labels, &mut self.labels);
+        shapes::of_geometry(&geometry, &mut self.shapes);
     }
 
     /// The CRS of every geometry column of a layer.

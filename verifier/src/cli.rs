@@ -7,7 +7,9 @@ use meshmark_core::{
     options::{OPTIONS, Options, Subject},
     record::Record,
 };
-use meshmark_verifier::{Demodulator, Error, ExitCode, Request, Result, progress::Progress, reading, verify};
+use meshmark_verifier::{
+    Demodulator, Error, ExitCode, Request, Result, progress::Progress, reading, registration::Start, verify,
+};
 use std::{io::Write, path::PathBuf};
 
 /// Watermarks of vector maps: make a key, verify a suspect map.
@@ -48,6 +50,9 @@ struct VerifyArgs {
     /// Attribute field to find landmarks by; repeatable, all string and integer fields by default
     #[arg(long, value_name = "FIELD")]
     landmark: Vec<String>,
+    /// How to bring the suspect onto the reference
+    #[arg(long, value_enum, default_value = "auto")]
+    registration: Start,
     /// How to demodulate
     #[arg(long, value_enum, default_value = "joint")]
     demodulator: Demodulator,
@@ -187,6 +192,7 @@ fn request(args: VerifyArgs) -> Result<Request> {
         layers: options.layers,
         srs: options.srs,
         landmarks: args.landmark,
+        registration: args.registration,
         demodulator: args.demodulator,
         radius_m: args.radius,
         significance: args.significance,

@@ -12,6 +12,7 @@ pub mod progress;
 pub mod reading;
 pub mod registration;
 pub mod report;
+mod shapes;
 pub mod verify;
 
 pub use error::{Error, ExitCode, Result};

@@ -1,11 +1,12 @@
 //! Registration: the affine map that brings a suspect back onto the reference (paper, section 3.5).
 //!
-//! Two starting points are tried, the identity and landmarks; each is refined on matched vertices, and
-//! the one under which more vertices match wins. Nothing here knows a key.
+//! Starting points are the identity, landmarks (features with the same attribute values) and geometry
+//! (features of the same shape). Each is refined on matched vertices, and the one under which most
+//! vertices match wins. Nothing here knows a key.
 
-use crate::{affine::Affine, matching::Matcher};
+use crate::{affine::Affine, matching::Matcher, shapes};
 use meshmark_core::{ground::Ground, vertices::VertexTable};
-use meshmark_dataset::{Dimension, Label};
+use meshmark_dataset::{Dimension, Label, Shape};
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
@@ -15,7 +16,7 @@ use std::collections::HashMap;
 
 /// Reference vertices used while refining; more would not make it better.
 const SAMPLE: usize = 20_000;
-/// When so many vertices of the smaller map match as they stand, there is nothing to search for.
+/// The share of the smaller map's vertices that is most of them.
 const AGREE: f64 = 0.5;
 /// Lines are used when there are fewer landmarks without them.
 const FEW_LANDMARKS: usize = 8;
@@ -23,7 +24,7 @@ const FEW_LANDMARKS: usize = 8;
 /// How a suspect was brought onto the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Registration {
-    /// "identity" or "landmarks": where the search started.
+    /// "identity", "landmarks" or "geometry": where the search started.
     pub method: &'static str,
     /// Suspect to reference coordinates: x′ = a x + b y + c, y′ = d x + e y + f, CRS units.
     pub affine: [f64; 6],
@@ -41,6 +42,19 @@ impl Registration {
     }
 }
 
+/// Where to start a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Start {
+    /// As it stands, by landmarks or by geometry, whichever is best
+    Auto,
+    /// Features with the same attribute values
+    Landmarks,
+    /// Features of the same shape
+    Geometry,
+    /// Nowhere: the suspect is taken as it stands
+    None,
+}
+
 /// One map of the two.
 #[derive(Clone, Copy)]
 pub struct Side<'a> {
@@ -48,21 +62,42 @@ pub struct Side<'a> {
     pub vertices: &'a VertexTable,
     /// Its labels.
     pub labels: &'a [Label],
+    /// Its rings and lines.
+    pub shapes: &'a [Shape],
 }
 
 /// Finds the affine map from the suspect to the reference. `radius_m` is the matching radius t.
-pub fn register(reference: Side, suspect: Side, ground: &Ground, radius_m: f64) -> Registration {
+pub fn register(
+    reference: Side,
+    suspect: Side,
+    ground: &Ground,
+    radius_m: f64,
+    start: Start,
+) -> Registration {
     let matcher = Matcher::new(reference.vertices.coords(), ground, reference.vertices.centre());
     let search = Search { matcher, reference, suspect, ground, radius_m };
-    let identity = search.refine("identity", Affine::IDENTITY, 0);
+    let as_it_stands = || search.refine("identity", Affine::IDENTITY, 0);
+    let by_landmarks = || search.from_pairs("landmarks", &pairs(reference.labels, suspect.labels));
+    let by_geometry = || search.from_pairs("geometry", &shapes::pairs(reference.shapes, suspect.shapes));
+    let ways: &[&dyn Fn() -> (Registration, usize)] = match start {
+        Start::Auto => &[&as_it_stands, &by_landmarks, &by_geometry],
+        Start::Landmarks => &[&by_landmarks],
+        Start::Geometry => &[&by_geometry],
+        Start::None => return search.unchanged(),
+    };
     let smaller = search.sample().min(suspect.vertices.len());
-    if identity.1 as f64 >= AGREE * smaller as f64 {
-        return identity.0;
+    let mut best: Option<(Registration, usize)> = None;
+    for way in ways {
+        let next = way();
+        if best.as_ref().is_none_or(|(_, matched)| next.1 > *matched) {
+            best = Some(next);
+        }
+        // When most vertices match there is nothing better to search for.
+        if best.as_ref().is_some_and(|(_, matched)| *matched as f64 >= AGREE * smaller as f64) {
+            break;
+        }
     }
-    let pairs = pairs(reference.labels, suspect.labels);
-    let starts = search.landmark_starts(&pairs);
-    let found = starts.into_iter().map(|(affine, count)| search.refine("landmarks", affine, count));
-    found.fold(identity, |best, next| if next.1 > best.1 { next } else { best }).0
+    best.expect("there is a way").0
 }
 
 /// Pairs of places (suspect, reference) of features that share an attribute value which occurs once
@@ -148,12 +183,20 @@ impl Search<'_> {
         pairs
     }
 
-    /// Affine maps that many landmark pairs agree on, within a few metres and within more: centroids of
-    /// cut or edited features are off by any amount. With each, how many pairs agree.
-    fn landmark_starts(&self, pairs: &[[[f64; 2]; 2]]) -> Vec<(Affine, usize)> {
+    /// The best of the affine maps that many pairs of places agree on, within a few metres or within more:
+    /// the places of cut or edited features are off by any amount. Without any, the identity.
+    fn from_pairs(&self, method: &'static str, pairs: &[[[f64; 2]; 2]]) -> (Registration, usize) {
         let unit = self.ground.metres_per_unit(self.reference.vertices.centre());
-        let consensus = |metres: f64| consensus(pairs, unit, metres);
-        [1.0, 5.0, 25.0].iter().filter_map(|factor| consensus(factor * self.radius_m)).collect()
+        let starts = [1.0, 5.0, 25.0].map(|factor| consensus(pairs, unit, factor * self.radius_m));
+        let refined = starts.into_iter().flatten().map(|(affine, agree)| self.refine(method, affine, agree));
+        let best = refined.reduce(|best, next| if next.1 > best.1 { next } else { best });
+        best.unwrap_or_else(|| (Registration { method, ..self.unchanged() }, 0))
+    }
+
+    fn unchanged(&self) -> Registration {
+        let pairs = self.matched(Affine::IDENTITY, self.radius_m);
+        let rms_m = (!pairs.from.is_empty()).then_some(pairs.rms_m);
+        Registration { method: "identity", affine: Affine::IDENTITY.coefficients, landmarks: 0, rms_m }
     }
 }
 
@@ -240,10 +283,11 @@ mod tests {
         };
         let theirs: Vec<Label> = labels.iter().enumerate().map(moved).collect();
         let found = register(
-            Side { vertices: &reference, labels: &labels },
-            Side { vertices: &suspect, labels: &theirs },
+            Side { vertices: &reference, labels: &labels, shapes: &[] },
+            Side { vertices: &suspect, labels: &theirs, shapes: &[] },
             &METRES,
             1.0,
+            Start::Auto,
         );
         assert_eq!((found.method, found.landmarks), ("landmarks", 30));
         assert!(found.rms_m.unwrap() < 1e-6, "{found:?}");
@@ -254,8 +298,8 @@ mod tests {
         let reference = VertexTable::new(scattered(500, 400)).unwrap();
         let moved = reference.coords().iter().map(|p| [p[0] + 0.3, p[1] - 0.2]).collect();
         let suspect = VertexTable::new(moved).unwrap();
-        let side = |vertices| Side { vertices, labels: &[] };
-        let found = register(side(&reference), side(&suspect), &METRES, 1.0);
+        let side = |vertices| Side { vertices, labels: &[], shapes: &[] };
+        let found = register(side(&reference), side(&suspect), &METRES, 1.0, Start::Auto);
         assert_eq!(found.method, "identity");
         assert!(found.rms_m.unwrap() < 1e-6, "{found:?}");
     }

@@ -6,7 +6,7 @@ use crate::{
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
-    registration::{Side, register},
+    registration::{Side, Start, register},
     report::{Report, VertexCounts},
 };
 use meshmark_core::{
@@ -57,6 +57,8 @@ pub struct Request {
     pub srs: Option<String>,
     /// Attributes to use as landmarks; all when empty.
     pub landmarks: Vec<String>,
+    /// Where to start the registration.
+    pub registration: Start,
     /// How to demodulate.
     pub demodulator: Demodulator,
     /// Matching radius t, metres.
@@ -89,13 +91,8 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
     patches.check_capacity(request.bits, request.parameters.chip_rate)?;
 
     progress.start("registration", 0);
-    let side = |vertices, labels| Side { vertices, labels };
-    let registration = register(
-        side(&reference.vertices, &reference.labels),
-        side(&suspect.vertices, &suspect.labels),
-        &ground,
-        request.radius_m,
-    );
+    let registration =
+        register(side(&reference), side(&suspect), &ground, request.radius_m, request.registration);
 
     progress.start("matching", 0);
     let moved = registration.apply(suspect.vertices.coords());
@@ -138,6 +135,10 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
     };
     let decision = decide(&found, request.expected.as_ref(), request.significance);
     Ok(Report::new(request, &reference, registration, counts, Some(&found), decision, progress.finish()))
+}
+
+fn side(survey: &Survey) -> Side<'_> {
+    Side { vertices: &survey.vertices, labels: &survey.labels, shapes: &survey.shapes }
 }
 
 /// The record must be of this very reference: the mesh of any other one differs.

@@ -17,7 +17,7 @@ use meshmark_verifier::{
     affine::Affine,
     decision::{Decision, Verdict, decide},
     matching::Matcher,
-    registration::{Side, register},
+    registration::{Side, Start, register},
 };
 use proptest::prelude::*;
 
@@ -62,10 +62,11 @@ impl Case {
     fn demodulate(&self, moved: &[[f64; 2]], key: &SecretKey) -> Demodulation {
         let suspect = VertexTable::new(moved.to_vec()).unwrap();
         let found = register(
-            Side { vertices: &self.reference, labels: &self.labels(self.reference.coords()) },
-            Side { vertices: &suspect, labels: &self.labels(moved) },
+            Side { vertices: &self.reference, labels: &self.labels(self.reference.coords()), shapes: &[] },
+            Side { vertices: &suspect, labels: &self.labels(moved), shapes: &[] },
             &self.ground,
             1.0,
+            Start::Auto,
         );
         let coords = found.apply(suspect.coords());
         let centre = self.reference.centre();
