@@ -18,6 +18,8 @@ use std::collections::HashMap;
 const SAMPLE: usize = 20_000;
 /// The share of the smaller map's vertices that is most of them.
 const AGREE: f64 = 0.5;
+/// Fewer matched vertices than this are chance: nothing was found.
+pub const LEAST_MATCHED: usize = 30;
 /// Lines are used when there are fewer landmarks without them.
 const FEW_LANDMARKS: usize = 8;
 
@@ -97,7 +99,8 @@ pub fn register(
             break;
         }
     }
-    best.expect("there is a way").0
+    let (found, matched) = best.expect("there is a way");
+    if matched < LEAST_MATCHED { search.unchanged() } else { found }
 }
 
 /// Pairs of places (suspect, reference) of features that share an attribute value which occurs once

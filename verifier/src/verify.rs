@@ -6,7 +6,7 @@ use crate::{
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
-    registration::{Side, Start, register},
+    registration::{LEAST_MATCHED, Side, Start, register},
     report::{Report, VertexCounts},
 };
 use meshmark_core::{
@@ -22,9 +22,6 @@ use meshmark_core::{
 };
 use meshmark_dataset::{LabelFields, Survey};
 use std::path::PathBuf;
-
-/// Fewer matched vertices than this are chance.
-const LEAST_MATCHED: usize = 30;
 
 /// Which of core's demodulators to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
