@@ -365,10 +365,8 @@ fn the_folder_of_a_shapefile_cannot_be_updated_while_it_is_read() {
 #[test]
 fn a_writer_that_truncates_the_source_all_the_same_leaves_a_saved_copy() {
     for (format, name) in [("KML", "map.kml"), ("GML", "map.gml"), ("MapInfo File", "map.tab")] {
-        let (host, expected) = (Host::new(), Host::new());
-        expected.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]);
-        let make = ["-f", format, name, &map(), "buildings"];
-        host.run("ogr2ogr", &make);
+        let host = Host::new();
+        host.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]);
         let original = fs::read(host.path(name)).unwrap();
         let run = host.mark(format, name, name, &[]);
         assert_ne!(run.code, Some(0), "{format}");

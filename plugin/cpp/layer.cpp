@@ -315,7 +315,6 @@ bool MeshmarkLayer::MeasureExtents()
     m_source.SetAttributeFilter(nullptr);
     m_source.SetSpatialFilter(m_iGeomFieldFilter, nullptr);
     ResetReading();
-    bool complete = true;
     CPLErrorReset();
     while (auto feature = ReadNext())
     {
@@ -329,7 +328,7 @@ bool MeshmarkLayer::MeasureExtents()
             extents[field].Merge(envelope);
         }
     }
-    complete = CPLGetLastErrorType() != CE_Failure;
+    const bool complete = CPLGetLastErrorType() != CE_Failure;
     if (m_pszAttrQueryString && !m_evaluatesGeometry)
         m_source.SetAttributeFilter(m_pszAttrQueryString);
     ApplySpatialFilterToSource();
