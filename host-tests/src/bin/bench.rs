@@ -321,6 +321,7 @@ const ROWS: &[Row] = &[
     ("patches s", |c| seconds(c.verify_stage("patches"))),
     ("registration s", |c| seconds(c.verify_stage("registration"))),
     ("matching s", |c| seconds(c.verify_stage("matching"))),
+    ("deformation s", |c| seconds(c.verify_stage("deformation"))),
     ("demodulation s", |c| seconds(c.verify_stage("demodulation"))),
     ("processor s", |c| format!("{:.2}", c.verified.processor())),
     ("peak memory MB", |c| format!("{:.0}", c.verified.peak_bytes() / 1e6)),
