@@ -17,6 +17,10 @@ use faer::{
     Mat, Par,
     linalg::{solvers::Solve, triangular_solve::solve_lower_triangular_in_place},
 };
+use rand_chacha::{
+    ChaCha20Rng,
+    rand_core::{Rng, SeedableRng},
+};
 use rayon::prelude::*;
 
 /// Displacements are never trusted to better than this.
@@ -65,6 +69,37 @@ impl Demodulation {
     /// message under the same key: bᵀb̂ / |b̂|, at most √m.
     pub fn recipient_score(&self, message: &Message) -> f64 {
         ratio(dot(&message.signs(), &self.estimate), dot(&self.estimate, &self.estimate).sqrt())
+    }
+
+    /// The [`Self::mark_score`] of `count` decoy keys on the same suspect: random signs instead of chips, those
+    /// of decoy k from ChaCha20 stream k.
+    pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
+        let deviation = self.null_deviation();
+        let score = |decoy: usize| {
+            let mut stream = ChaCha20Rng::from_seed(seed);
+            stream.set_stream(decoy as u64);
+            let sum_word = |values: &[f64]| {
+                let word = stream.next_u64();
+                let signed = |(i, a): (usize, &f64)| f64::from_bits(a.to_bits() ^ (word >> i << 63));
+                values.iter().enumerate().map(signed).sum::<f64>()
+            };
+            ratio(self.chip_correlations.chunks(64).map(sum_word).sum(), deviation)
+        };
+        (0..count).into_par_iter().map(score).collect()
+    }
+
+    /// Σ_j q_j² / n_j with n_j = Σ a_i² over the chips of bit j, and the number of bits it runs over. For a key
+    /// that was not used it is chi-squared with so many degrees of freedom; any message raises it.
+    pub fn key_score(&self, chip_rate: usize) -> (f64, usize) {
+        let bits = self.scores.len();
+        let mut energy = vec![0.0; bits];
+        for axis in self.chip_correlations.chunks(bits * chip_rate) {
+            for (i, a) in axis.iter().enumerate() {
+                energy[bit_of_coefficient(i + 1, chip_rate)] += a * a;
+            }
+        }
+        let seen = energy.iter().zip(&self.scores).filter(|(n, _)| **n > 0.0);
+        seen.fold((0.0, 0), |(sum, count), (n, q)| (sum + q * q / n, count + 1))
     }
 
     fn null_deviation(&self) -> f64 {
@@ -319,5 +354,50 @@ impl<'a> Job<'a> {
                 a
             })
             .expect("a map has patches"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 3 bits of 2 chips, 50 patches; a third of the correlations is 0.
+    fn found() -> Demodulation {
+        let correlation = |i: usize| (i % 3) as f64 * (1.0 + (i % 7) as f64);
+        Demodulation {
+            estimate: vec![0.0; 3],
+            variance: vec![1.0; 3],
+            scores: vec![30.0, -40.0, 0.0],
+            chip_correlations: (0..600).map(correlation).collect(),
+            expected_sum: 1.0,
+            noise_m: 0.1,
+        }
+    }
+
+    #[test]
+    fn decoys_are_standard_normal_and_the_same_for_the_same_seed() {
+        let scores = found().decoy_scores(10_000, [5; 32]);
+        assert_eq!(scores[..10], found().decoy_scores(10, [5; 32]));
+        assert_ne!(scores[..10], found().decoy_scores(10, [6; 32]));
+        let mean = scores.iter().sum::<f64>() / 1e4;
+        let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / 1e4;
+        assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.07, "{mean} {variance}"); // 5 deviations
+        let beyond = scores.iter().filter(|s| **s > 1.644_854).count();
+        assert!((390..610).contains(&beyond), "{beyond} instead of 500");
+    }
+
+    #[test]
+    fn the_key_score_weighs_every_bit_by_its_own_chips_and_leaves_out_what_was_not_seen() {
+        let mut found = found();
+        let energy = |bits: std::ops::Range<usize>, found: &Demodulation| -> f64 {
+            let all = found.chip_correlations.iter().enumerate();
+            all.filter(|(i, _)| bits.contains(&(i % 6))).map(|(_, a)| a * a).sum()
+        };
+        let expected = 900.0 / energy(0..2, &found) + 1600.0 / energy(2..4, &found);
+        assert!((found.key_score(2).0 - expected).abs() < 1e-12);
+        assert_eq!(found.key_score(2).1, 3);
+        found.chip_correlations.iter_mut().skip(4).step_by(6).for_each(|a| *a = 0.0);
+        found.chip_correlations.iter_mut().skip(5).step_by(6).for_each(|a| *a = 0.0);
+        assert_eq!(found.key_score(2).1, 2);
     }
 }

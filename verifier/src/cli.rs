@@ -8,7 +8,8 @@ use meshmark_core::{
     record::Record,
 };
 use meshmark_verifier::{
-    Demodulator, Error, ExitCode, Request, Result, progress::Progress, reading, registration::Start, verify,
+    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, explain::Inputs,
+    progress::Progress, reading, registration::Start, verify, verify::check_key,
 };
 use std::{io::Write, path::PathBuf};
 
@@ -45,6 +46,9 @@ struct VerifyArgs {
     /// Record the driver wrote when it marked the map
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Folder of records (*.json): which of their recipients' copies is it?
+    #[arg(long, value_name = "FOLDER", conflicts_with = "record")]
+    records: Option<PathBuf>,
     /// The map in question
     suspect: PathBuf,
     /// Attribute field to find landmarks by; repeatable, all string and integer fields by default
@@ -65,6 +69,9 @@ struct VerifyArgs {
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
+    /// Say in sentences what was compared, found and not tested
+    #[arg(long, conflicts_with = "json")]
+    explain: bool,
     #[command(flatten)]
     marking: MarkingFlags,
 }
@@ -80,6 +87,7 @@ impl Args for MarkingFlags {
                 .long(option.name.to_lowercase().replace('_', "-"))
                 .value_name(option.name)
                 .allow_negative_numbers(true)
+                .conflicts_with("records")
                 .help_heading("How the map was marked (taken from the record when there is one)")
                 .help(format!("{}{default}", option.help))
         });
@@ -158,11 +166,19 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
 }
 
 fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
-    let json = args.json;
+    let inputs = args.explain.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
+    let (json, records, record) = (args.json, args.records.clone(), args.record.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
-    let report = verify(&request, &mut progress)?;
+    let mut warn = |text: &str| eprintln!("meshmark: {text}");
+    let report = match &records {
+        Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
+        None => verify(&request, &mut progress)?,
+    };
     print!("{}", if json { report.to_json() } else { report.to_text() });
+    if let Some(inputs) = inputs {
+        print!("\n{}", inputs.explain(&report, record.as_deref(), records.as_deref())?);
+    }
     Ok(report.exit_code())
 }
 
@@ -183,6 +199,10 @@ fn request(args: VerifyArgs) -> Result<Request> {
     let expected = options.subject.as_ref().map(|subject| subject.message(&key));
     Ok(Request {
         bits: expected.as_ref().map_or(128, Message::len),
+        recipient: options.subject.and_then(|subject| match subject {
+            Subject::Recipient(text) => Some(text),
+            Subject::Message(_) => None,
+        }),
         expected,
         key,
         reference: args.reference,
@@ -234,23 +254,6 @@ fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> 
                 "--{flag} {value} contradicts the record: leave one of them out"
             )));
         }
-    }
-    Ok(())
-}
-
-/// The record must be of this key, and its message what key and recipient give.
-fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
-    if record.key_id != key.id() {
-        return Err(Error::DoesNotBelong(format!(
-            "the record was made with key {}, and this is key {}: give the key it was made with",
-            record.key_id,
-            key.id()
-        )));
-    }
-    if record.subject()?.message(key) != record.message()? {
-        return Err(Error::DoesNotBelong(
-            "the record's message is not that of its recipient under this key: the record was changed".into(),
-        ));
     }
     Ok(())
 }

@@ -6,9 +6,9 @@
 //! one, Bentkus and Dzindzalieta 2015). *Is it this recipient?* Under the right key, an unrelated
 //! recipient has a random message: bᵀb̂ has mean 0 and variance |b̂|². The larger p counts.
 
+use crate::survival;
 use meshmark_core::{demodulation::Demodulation, message::Message};
 use serde::Serialize;
-use statrs::function::erf::erfc;
 
 /// A message of fewer bits is shared by too many recipients.
 pub const LEAST_BITS: usize = 20;
@@ -39,31 +39,42 @@ pub struct Decision {
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the probability of this much agreement with a random recipient.
     pub p_recipient_log10: Option<f64>,
+    /// How many messages were tried.
+    pub tried: usize,
 }
 
 impl Decision {
-    /// The larger of the two.
+    /// The larger of the two, times the number of messages tried (Bonferroni).
     pub fn p_value_log10(&self) -> Option<f64> {
-        Some(self.p_mark_log10?.max(self.p_recipient_log10?))
+        let larger = self.p_mark_log10?.max(self.p_recipient_log10?);
+        Some((larger + (self.tried as f64).log10()).min(0.0))
     }
 
     /// No answer, for a reason found before demodulation.
     pub fn inconclusive(reason: String) -> Self {
-        Decision { verdict: Verdict::Inconclusive, reason, p_mark_log10: None, p_recipient_log10: None }
+        let (p_mark_log10, p_recipient_log10) = (None, None);
+        Decision { verdict: Verdict::Inconclusive, reason, p_mark_log10, p_recipient_log10, tried: 1 }
     }
 }
 
 /// Weighs a demodulation against the expected message.
 pub fn decide(found: &Demodulation, expected: Option<&Message>, significance: f64) -> Decision {
-    let Some(message) = expected else {
-        return Decision::inconclusive(
+    match expected {
+        Some(message) => decide_among(found, message, 1, significance),
+        None => Decision::inconclusive(
             "no expected message was given, so there is nothing to compare the decoded one with".into(),
-        );
-    };
+        ),
+    }
+}
+
+/// Weighs a demodulation against one of the messages that are tried.
+pub fn decide_among(found: &Demodulation, message: &Message, tried: usize, significance: f64) -> Decision {
+    let significance = significance / tried as f64; // Bonferroni
     let bits = message.len();
-    let p_mark = log10_survival(found.mark_score(message));
+    let p_mark = survival::normal_log10(found.mark_score(message));
     // A message of m bits cannot be hit less often than once in 2^m.
-    let p_recipient = log10_survival(found.recipient_score(message)).max(-(bits as f64) * 2f64.log10());
+    let p_recipient =
+        survival::normal_log10(found.recipient_score(message)).max(-(bits as f64) * 2f64.log10());
     let (verdict, reason) = if bits < LEAST_BITS {
         let reason =
             format!("a message of {bits} bits cannot identify anyone: mark with {LEAST_BITS} or more");
@@ -75,7 +86,15 @@ pub fn decide(found: &Demodulation, expected: Option<&Message>, significance: f6
     } else {
         (Verdict::Inconclusive, "too little of the map was matched for a mark to show".into())
     };
-    Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient) }
+    Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient), tried }
+}
+
+/// log₁₀ of the probability of this much evidence for any message at all under a random key; `None` where
+/// nothing was observed to move. Few chips may carry a bit, but the even moments of sums of random signs are
+/// at most those of normal variables, so Chernoff's bound on chi-squared holds for them however few.
+pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64> {
+    let (score, degrees) = found.key_score(chip_rate);
+    (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
 }
 
 /// Whether a full mark would be expected to pass both tests with a margin.
@@ -89,31 +108,9 @@ fn would_show(found: &Demodulation, bits: usize, significance: f64) -> bool {
     visible && known.sqrt() > needed
 }
 
-/// log₁₀ of the standard normal survival function; finite for every finite score.
-pub fn log10_survival(score: f64) -> f64 {
-    if score < 30.0 {
-        return (erfc(score / std::f64::consts::SQRT_2) / 2.0).log10();
-    }
-    // Abramowitz and Stegun 26.2.12, two terms; erfc underflows from 38 on.
-    let z2 = score * score;
-    let ln = -z2 / 2.0 - (score * (2.0 * std::f64::consts::PI).sqrt()).ln()
-        + (-1.0 / z2 + 3.0 / (z2 * z2)).ln_1p();
-    ln / std::f64::consts::LN_10
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_survival_function_has_its_tabled_values_and_no_infinities() {
-        for (score, p) in [(0.0, 0.5), (1.0, 0.158_655_25), (5.0, 2.866_516e-7), (-2.0, 0.977_249_87)] {
-            assert!((log10_survival(score) - f64::log10(p)).abs() < 1e-6, "{score}");
-        }
-        // Continuous where the formula changes, and finite far out.
-        assert!((log10_survival(29.999_999_9) - log10_survival(30.0)).abs() < 1e-4);
-        assert!((log10_survival(100.0) + 2173.87).abs() < 0.01, "{}", log10_survival(100.0));
-    }
 
     fn evidence(estimate: Vec<f64>, scores: Vec<f64>) -> Demodulation {
         Demodulation {
@@ -144,6 +141,18 @@ mod tests {
         let found = evidence(message.signs(), message.signs().iter().map(|b| 1e4 * b).collect());
         assert_eq!(decide(&found, Some(&message), 0.1).verdict, Verdict::Inconclusive);
         assert_eq!(decide(&found, None, 1e-6).verdict, Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn the_p_value_is_that_of_all_messages_tried() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let scores: Vec<f64> = message.signs().iter().map(|b| 4.5 * b).collect(); // 5.76 deviations
+        let found = evidence(message.signs(), scores);
+        let alone = decide(&found, Some(&message), 1e-6);
+        let among = decide_among(&found, &message, 1000, 1e-6);
+        assert!((alone.p_value_log10().unwrap() + 3.0 - among.p_value_log10().unwrap()).abs() < 1e-12);
+        assert_eq!((alone.verdict, among.verdict), (Verdict::Match, Verdict::NoMatch));
+        assert_eq!(decide_among(&found, &message, 1 << 60, 0.5).p_value_log10(), Some(0.0));
     }
 
     #[test]

@@ -5,14 +5,18 @@
 #![forbid(unsafe_code)]
 
 pub mod affine;
+pub mod candidates;
 pub mod decision;
+pub mod decoys;
 mod error;
+pub mod explain;
 pub mod matching;
 pub mod progress;
 pub mod reading;
 pub mod registration;
 pub mod report;
 mod shapes;
+pub mod survival;
 pub mod verify;
 
 pub use error::{Error, ExitCode, Result};

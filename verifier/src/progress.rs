@@ -39,7 +39,7 @@ impl Progress {
     /// Ends the last stage and clears the line; seconds by stage.
     pub fn finish(&mut self) -> &BTreeMap<&'static str, f64> {
         if let Some((stage, since)) = self.stage.take() {
-            self.seconds.insert(stage, since.elapsed().as_secs_f64());
+            *self.seconds.entry(stage).or_default() += since.elapsed().as_secs_f64();
         }
         self.bar.finish_and_clear();
         &self.seconds

@@ -87,15 +87,94 @@ fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> 
     Err(Error::Usage(format!("the reference {path} has no field \"{name}\": --landmark may name {known}")))
 }
 
-/// Reads the suspect in the CRS of the reference, where both are known.
-pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Survey> {
-    if !path.exists() {
+/// Reads the suspect in the CRS of the reference, where both are known; and the CRS of its layers.
+pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<(Survey, Vec<String>)> {
+    if !path.is_file() && !path.is_dir() {
         let path = path.display();
         return Err(Error::Unreadable(format!("the suspect {path} is not a file here: give a local file")));
     }
+    forbid_network().map_err(|error| Error::Unreadable(format!("GDAL takes no option: {error}")))?;
     let dataset = open("suspect", path, Some(SUSPECT_DRIVERS))?;
+    check_plain(path, &dataset)?;
     let target = reference.crs.as_ref().map_or(Target::Raw, Target::Crs);
-    read("suspect", path, &dataset, reading, target)
+    Ok((read("suspect", path, &dataset, reading, target)?, crs_of(&dataset)))
+}
+
+/// A suspect may name addresses: as the CRS of a GeoJSON file, as the schema of a GML file. Nobody shall learn
+/// from a request that it is being looked at, nor answer it.
+fn forbid_network() -> gdal::errors::Result<()> {
+    for (option, value) in [
+        ("GDAL_HTTP_PROXY", "127.0.0.1:0"), // no one can listen there
+        ("GDAL_HTTPS_PROXY", "127.0.0.1:0"),
+        ("CPL_VSIL_CURL_ALLOWED_FILENAME", "none"),
+        ("GML_DOWNLOAD_SCHEMA", "NO"),
+        ("GML_SKIP_RESOLVE_ELEMS", "ALL"),
+        ("ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW", "NO"),
+        ("OGR_SQLITE_LOAD_EXTENSIONS", ""),
+        ("SPATIALITE_SECURITY", "strict"),
+    ] {
+        gdal::config::set_thread_local_config_option(option, value)?;
+    }
+    Ok(())
+}
+
+/// Virtual tables that hold what is in the database itself; any other may point at other files.
+const PLAIN_MODULES: &[&str] = &[
+    "rtree",
+    "rtree_i32",
+    "fts3",
+    "fts4",
+    "fts5",
+    "virtualspatialindex",
+    "virtualelementary",
+    "virtualknn",
+    "virtualknn2",
+];
+
+/// Refuses a database with virtual tables that take their rows from elsewhere.
+fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
+    if !matches!(dataset.driver().short_name().as_str(), "GPKG" | "SQLite") {
+        return Ok(());
+    }
+    let failed = |error: gdal::errors::GdalError| {
+        Error::Unreadable(format!("the suspect {} cannot be read: {error}", path.display()))
+    };
+    // A forged schema may have any type, page and spacing; its text is what SQLite goes by.
+    let query = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
+    let tables = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT).map_err(failed)?;
+    let Some(mut tables) = tables else { return Ok(()) };
+    for table in tables.features() {
+        let text = |field: usize| table.field_as_string(field).ok().flatten().unwrap_or_default();
+        if !is_plain(&text(1)) {
+            return Err(Error::Unreadable(format!(
+                "the suspect {} has a virtual table \"{}\", which may point at other files: copy its layers to \
+                 a plain file, for example with ogr2ogr",
+                path.display(),
+                text(0).escape_debug()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the module of CREATE VIRTUAL TABLE name USING module(…) is a plain one. A name that has "using" in
+/// it finds no plain module, or the right one: every USING must be of a plain module.
+fn is_plain(sql: &str) -> bool {
+    let sql = sql.to_lowercase();
+    let modules = sql.split("using").skip(1).map(|rest| {
+        let word = rest.trim_start().split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        word.into_iter().next().unwrap_or_default()
+    });
+    let mut modules = modules.peekable();
+    modules.peek().is_some() && modules.all(|module| PLAIN_MODULES.contains(&module))
+}
+
+fn crs_of(dataset: &Dataset) -> Vec<String> {
+    let label = |layer: gdal::vector::Layer| {
+        let crs = layer.spatial_ref().map(|crs| meshmark_dataset::CoordinateSystem::new(crs).label());
+        crs.unwrap_or_else(|| "no CRS".into())
+    };
+    dataset.layers().map(label).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {

@@ -79,8 +79,8 @@ pub fn register(
     let matcher = Matcher::new(reference.vertices.coords(), ground, reference.vertices.centre());
     let search = Search { matcher, reference, suspect, ground, radius_m };
     let as_it_stands = || search.refine("identity", Affine::IDENTITY, 0);
-    let by_landmarks = || search.from_pairs("landmarks", &pairs(reference.labels, suspect.labels));
-    let by_geometry = || search.from_pairs("geometry", &shapes::pairs(reference.shapes, suspect.shapes));
+    let by_landmarks = || search.by_pairs("landmarks", &pairs(reference.labels, suspect.labels));
+    let by_geometry = || search.by_pairs("geometry", &shapes::pairs(reference.shapes, suspect.shapes));
     let ways: &[&dyn Fn() -> (Registration, usize)] = match start {
         Start::Auto => &[&as_it_stands, &by_landmarks, &by_geometry],
         Start::Landmarks => &[&by_landmarks],
@@ -188,7 +188,7 @@ impl Search<'_> {
 
     /// The best of the affine maps that many pairs of places agree on, within a few metres or within more:
     /// the places of cut or edited features are off by any amount. Without any, the identity.
-    fn from_pairs(&self, method: &'static str, pairs: &[[[f64; 2]; 2]]) -> (Registration, usize) {
+    fn by_pairs(&self, method: &'static str, pairs: &[[[f64; 2]; 2]]) -> (Registration, usize) {
         let unit = self.ground.metres_per_unit(self.reference.vertices.centre());
         let starts = [1.0, 5.0, 25.0].map(|factor| consensus(pairs, unit, factor * self.radius_m));
         let refined = starts.into_iter().flatten().map(|(affine, agree)| self.refine(method, affine, agree));

@@ -1,13 +1,14 @@
 //! The report: one JSON object, or a short answer for a person.
 
 use crate::{
-    decision::{Decision, Verdict},
+    candidates::Candidates,
+    decision::{Decision, Verdict, p_any_message_log10},
+    decoys::Decoys,
     error::ExitCode,
     registration::Registration,
-    verify::{Demodulator, Request},
+    verify::{Demodulator, Examination, Request},
 };
 use meshmark_core::demodulation::Demodulation;
-use meshmark_dataset::Survey;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -26,12 +27,18 @@ pub struct Report {
     pub bits: Vec<f64>,
     /// How many bits differ from the expected message.
     pub bit_errors: Option<usize>,
-    /// The larger of the next two.
+    /// The larger of the next two, times the number of candidates.
     pub p_value_log10: Option<f64>,
     /// log₁₀ p of this much evidence under a random key.
     pub p_mark_log10: Option<f64>,
     /// log₁₀ p of this much agreement with a random recipient.
     pub p_recipient_log10: Option<f64>,
+    /// log₁₀ p of this much evidence for any message at all under a random key.
+    pub p_any_message_log10: Option<f64>,
+    /// The records that were tried; null when one mark was asked for.
+    pub candidates: Option<Candidates>,
+    /// How decoy keys score; null when nothing was decoded or nothing moved.
+    pub decoys: Option<Decoys>,
     /// How the suspect was brought onto the reference.
     pub registration: Registration,
     /// Vertices of the two maps.
@@ -40,6 +47,12 @@ pub struct Report {
     pub parameters: ReportParameters,
     /// Seconds by stage.
     pub seconds: BTreeMap<&'static str, f64>,
+    /// Digest of the vertices of the reference.
+    #[serde(skip)]
+    pub reference_digest: String,
+    /// CRS of the suspect's layers.
+    #[serde(skip)]
+    pub suspect_crs: Vec<String>,
 }
 
 /// Distinct vertices.
@@ -78,29 +91,32 @@ impl Report {
     /// Puts the pieces together.
     pub fn new(
         request: &Request,
-        reference: &Survey,
-        registration: Registration,
-        vertices: VertexCounts,
-        found: Option<&Demodulation>,
+        seen: &Examination,
         decision: Decision,
         seconds: &BTreeMap<&'static str, f64>,
     ) -> Self {
+        let (found, expected) = (seen.found.as_ref().ok(), request.expected.as_ref());
         let message = found.map(Demodulation::message);
-        let errors = message.as_ref().zip(request.expected.as_ref()).map(|(m, expected)| m.errors(expected));
+        let tested = found.zip(expected).map(|(found, expected)| found.mark_score(expected));
         Report {
             meshmark_report: 1,
             verdict: decision.verdict,
             p_value_log10: decision.p_value_log10(),
             p_mark_log10: decision.p_mark_log10,
             p_recipient_log10: decision.p_recipient_log10,
+            p_any_message_log10: found.and_then(|f| p_any_message_log10(f, request.parameters.chip_rate)),
+            candidates: None,
+            decoys: seen.decoys.clone().map(|decoys| Decoys { tested, ..decoys }),
             reason: decision.reason,
+            bit_errors: message.as_ref().zip(expected).map(|(m, expected)| m.errors(expected)),
             message: message.map(|m| m.to_hex()),
             bits: found.map(Demodulation::log_likelihood_ratios).unwrap_or_default(),
-            bit_errors: errors,
-            registration,
-            vertices,
-            parameters: ReportParameters::new(request, reference, found),
+            registration: seen.registration.clone(),
+            vertices: seen.vertices,
+            parameters: ReportParameters::new(request, seen),
             seconds: seconds.clone(),
+            reference_digest: seen.reference_digest.clone(),
+            suspect_crs: seen.suspect_crs.clone(),
         }
     }
 
@@ -112,23 +128,21 @@ impl Report {
     /// A short answer for a person.
     pub fn to_text(&self) -> String {
         let mut lines = vec![format!("verdict:      {}: {}", self.verdict_name(), self.reason)];
+        if let Some(candidates) = &self.candidates {
+            lines.extend(candidates.to_lines());
+        }
         if let Some(message) = &self.message {
             let errors = self.bit_errors.map_or(String::new(), |errors| {
                 format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
             });
             lines.push(format!("message:      {message}{errors}"));
-            lines.push(format!("weakest bit:  right with odds {}", odds(&self.bits)));
+            // Of noise, too, bits are made; their odds suppose a mark.
+            lines.push(match self.verdict == Verdict::Match || self.shows_key() {
+                true => format!("bits:         {}", certainty(&self.bits)),
+                false => "bits:         no better than guessed, for no mark of this key shows".into(),
+            });
         }
-        if let (Some(p), Some(mark), Some(recipient)) =
-            (self.p_value_log10, self.p_mark_log10, self.p_recipient_log10)
-        {
-            lines.push(format!(
-                "p-value:      {} (key {}, recipient {})",
-                power_of_ten(p),
-                power_of_ten(mark),
-                power_of_ten(recipient)
-            ));
-        }
+        lines.extend(self.p_value_lines());
         let v = &self.vertices;
         lines.push(format!(
             "vertices:     {} of {} reference vertices found among {} of the suspect",
@@ -143,7 +157,38 @@ impl Report {
         lines.join("\n") + "\n"
     }
 
-    fn verdict_name(&self) -> &'static str {
+    fn p_value_lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let (Some(p), Some(mark), Some(recipient)) =
+            (self.p_value_log10, self.p_mark_log10, self.p_recipient_log10)
+        {
+            let tried = match &self.candidates {
+                Some(candidates) if candidates.tried > 1 => format!(", times {} tried", candidates.tried),
+                _ => String::new(),
+            };
+            lines.push(format!(
+                "p-value:      {} (key {}, recipient {}{tried})",
+                power_of_ten(p),
+                power_of_ten(mark),
+                power_of_ten(recipient)
+            ));
+        }
+        if let Some(p) = self.p_any_message_log10.filter(|_| self.verdict != Verdict::Match) {
+            let says = match self.shows_key() {
+                true => "a mark of this key is present, whatever its message",
+                false => "no mark of this key shows, whatever its message",
+            };
+            lines.push(format!("key:          {says} (p-value {})", power_of_ten(p)));
+        }
+        lines
+    }
+
+    /// Whether some mark of the key is there, whatever its message.
+    pub(crate) fn shows_key(&self) -> bool {
+        self.p_any_message_log10.is_some_and(|p| p < self.parameters.significance.log10())
+    }
+
+    pub(crate) fn verdict_name(&self) -> &'static str {
         match self.verdict {
             Verdict::Match => "MATCH",
             Verdict::NoMatch => "NO MATCH",
@@ -162,11 +207,11 @@ impl Report {
 }
 
 impl ReportParameters {
-    fn new(request: &Request, reference: &Survey, found: Option<&Demodulation>) -> Self {
+    fn new(request: &Request, seen: &Examination) -> Self {
         let p = &request.parameters;
         ReportParameters {
             key_id: request.key.id(),
-            recipient: request.record.as_ref().and_then(|record| record.recipient.clone()),
+            recipient: request.recipient.clone(),
             expected_message: request.expected.as_ref().map(|m| m.to_hex()),
             amplitude_m: p.amplitude_m,
             chip_rate: p.chip_rate,
@@ -174,25 +219,55 @@ impl ReportParameters {
             tolerance_m: p.tolerance_m,
             precision_crs_units: p.precision,
             layers: request.layers.clone(),
-            crs: reference.crs.as_ref().map(|crs| crs.label()),
+            crs: seen.crs.clone(),
             demodulator: match request.demodulator {
                 Demodulator::Paper => "paper",
                 Demodulator::Joint => "joint",
             },
             radius_m: request.radius_m,
             significance: request.significance,
-            noise_m: found.map(|found| found.noise_m),
+            noise_m: seen.found.as_ref().ok().map(|found| found.noise_m),
             software: format!("meshmark {}", env!("CARGO_PKG_VERSION")),
         }
     }
 }
 
-fn power_of_ten(log10: f64) -> String {
+/// A probability from its logarithm.
+pub fn power_of_ten(log10: f64) -> String {
     if log10 > -3.0 { format!("{:.3}", 10f64.powf(log10)) } else { format!("10^{log10:.1}") }
 }
 
-/// "1000 : 1" for the least certain bit.
-fn odds(bits: &[f64]) -> String {
-    let least = bits.iter().map(|llr| llr.abs()).fold(f64::INFINITY, f64::min);
-    if least > 13.8 { "over a million to 1".into() } else { format!("{:.1} to 1", least.exp()) }
+/// Text of a file on one line, without what would steer a terminal.
+pub fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
+/// How sure the bits are, from their log-likelihood ratios.
+fn certainty(bits: &[f64]) -> String {
+    let mut sure: Vec<f64> = bits.iter().map(|llr| llr.abs()).collect();
+    sure.sort_by(f64::total_cmp);
+    let beyond = sure.iter().filter(|llr| **llr > 1000f64.ln()).count();
+    let (weakest, median) = (odds(sure[0]), odds(sure[sure.len() / 2]));
+    format!("weakest right with odds {weakest}, median {median}; {beyond} of {} over 1000 to 1", bits.len())
+}
+
+/// "1000 to 1", from a log-likelihood ratio.
+fn odds(llr: f64) -> String {
+    if llr > 13.8 { "over a million to 1".into() } else { format!("{:.1} to 1", llr.exp()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_certainty_of_the_bits_is_in_odds() {
+        let text = certainty(&[-20.0, 2f64.ln(), 7.0, -7.5, 0.0]);
+        assert_eq!(text, "weakest right with odds 1.0 to 1, median 1096.6 to 1; 3 of 5 over 1000 to 1");
+    }
+
+    #[test]
+    fn names_do_not_steer_the_terminal() {
+        assert_eq!(printable("A\u{1b}[31m\nB é"), "A\u{fffd}[31m\u{fffd}B é");
+    }
 }

@@ -3,16 +3,17 @@
 use crate::{
     Error, Result,
     decision::{Decision, decide},
+    decoys::Decoys,
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
-    registration::{LEAST_MATCHED, Side, Start, register},
+    registration::{LEAST_MATCHED, Registration, Side, Start, register},
     report::{Report, VertexCounts},
 };
 use meshmark_core::{
     carrier::Carrier,
     deformation::{Deformation, Prediction},
-    demodulation,
+    demodulation::{self, Demodulation},
     ground::Ground,
     key::SecretKey,
     message::Message,
@@ -33,6 +34,7 @@ pub enum Demodulator {
 }
 
 /// What to verify, and against what.
+#[derive(Clone)]
 pub struct Request {
     /// The secret key.
     pub key: SecretKey,
@@ -42,6 +44,8 @@ pub struct Request {
     pub suspect: PathBuf,
     /// What the driver wrote when it marked.
     pub record: Option<Record>,
+    /// The recipient the message was made from.
+    pub recipient: Option<String>,
     /// The message the suspect should carry, if it is known.
     pub expected: Option<Message>,
     /// Bits of the message.
@@ -64,32 +68,79 @@ pub struct Request {
     pub significance: f64,
 }
 
+impl Request {
+    fn landmarks(&self) -> LabelFields<'_> {
+        match self.landmarks.as_slice() {
+            [] => LabelFields::All,
+            names => LabelFields::Named(names),
+        }
+    }
+}
+
+/// What a suspect shows before it is compared with any message.
+pub struct Examination {
+    /// How the suspect was brought onto the reference.
+    pub registration: Registration,
+    /// Vertices of the two maps.
+    pub vertices: VertexCounts,
+    /// Digest of the vertices of the reference.
+    pub reference_digest: String,
+    /// CRS of the reference.
+    pub crs: Option<String>,
+    /// CRS of the suspect's layers.
+    pub suspect_crs: Vec<String>,
+    /// What was demodulated, or why nothing was.
+    pub found: std::result::Result<Demodulation, String>,
+    /// How decoy keys score.
+    pub decoys: Option<Decoys>,
+}
+
 /// Verifies one suspect.
 ///
 /// # Errors
 /// Unreadable input, parameters that do not fit the reference, a record of another reference.
 pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
-    let landmarks = match request.landmarks.as_slice() {
-        [] => LabelFields::All,
-        names => LabelFields::Named(names),
+    let reference = read_reference(request, progress)?;
+    if let Some(record) = &request.record {
+        check_reference(record, request, &reference, &reference.vertices.digest())?;
+    }
+    let seen = examine(request, &reference, progress)?;
+    let decision = match &seen.found {
+        Ok(found) => decide(found, request.expected.as_ref(), request.significance),
+        Err(reason) => Decision::inconclusive(reason.clone()),
     };
+    Ok(Report::new(request, &seen, decision, progress.finish()))
+}
+
+/// Reads the reference of a request.
+///
+/// # Errors
+/// It cannot be read, or has not what the request names.
+pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Survey> {
     progress.start("reading", 0);
-    let reading = Reading { layers: request.layers.as_deref(), srs: request.srs.as_deref(), landmarks };
-    let reference = reading::reference(&request.reference, &reading)?;
-    check_reference(request, &reference)?;
+    let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
+    reading::reference(&request.reference, &Reading { layers, srs, landmarks: request.landmarks() })
+}
+
+/// Registers, matches and demodulates the suspect of a request.
+///
+/// # Errors
+/// An unreadable suspect, parameters that do not fit the reference.
+pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Examination> {
     let ground = reference
         .ground()
         .map_err(|error| Error::Usage(format!("the reference {}: {error}", request.reference.display())))?;
-    let suspect =
-        reading::suspect(&request.suspect, &Reading { layers: None, srs: None, landmarks }, &reference)?;
+    progress.start("reading", 0);
+    let plain = Reading { layers: None, srs: None, landmarks: request.landmarks() };
+    let (suspect, suspect_crs) = reading::suspect(&request.suspect, &plain, reference)?;
 
     progress.start("patches", 0);
     let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size)?;
     patches.check_capacity(request.bits, request.parameters.chip_rate)?;
 
     progress.start("registration", 0);
-    let registration =
-        register(side(&reference), side(&suspect), &ground, request.radius_m, request.registration);
+    let (radius_m, start) = (request.radius_m, request.registration);
+    let registration = register(side(reference), side(&suspect), &ground, radius_m, start);
 
     progress.start("matching", 0);
     let moved = registration.apply(suspect.vertices.coords());
@@ -97,51 +148,90 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
     let matches = matcher.all(&moved, request.radius_m);
     let chance = by_chance(&matcher, &moved, &ground, reference.vertices.centre(), request.radius_m);
 
-    let counts = VertexCounts {
-        reference: reference.vertices.len(),
-        suspect: suspect.vertices.len(),
-        matched: matches.count,
+    let mut seen = Examination {
+        registration,
+        vertices: VertexCounts {
+            reference: reference.vertices.len(),
+            suspect: suspect.vertices.len(),
+            matched: matches.count,
+        },
+        reference_digest: reference.vertices.digest(),
+        crs: reference.crs.as_ref().map(|crs| crs.label()),
+        suspect_crs,
+        found: Err(unregistered(matches.count, reference.vertices.len(), chance)),
+        decoys: None,
     };
-    if matches.count < LEAST_MATCHED || matches.count < 2 * chance {
-        let reason = format!(
-            "{} of {} reference vertices match, no more than by chance ({chance}): the suspect was not registered",
-            matches.count,
-            reference.vertices.len()
-        );
-        let decision = Decision::inconclusive(reason);
-        return Ok(Report::new(request, &reference, registration, counts, None, decision, progress.finish()));
+    if matches.count >= LEAST_MATCHED && matches.count >= 2 * chance {
+        let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches };
+        let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress)?;
+        seen.decoys = Decoys::new(&found, &suspect.vertices, &reference.vertices);
+        seen.found = Ok(found);
     }
+    Ok(seen)
+}
 
+fn unregistered(matched: usize, reference: usize, chance: usize) -> String {
+    format!(
+        "{matched} of {reference} reference vertices match, no more than by chance ({chance}): the suspect was not \
+         registered"
+    )
+}
+
+fn demodulate(
+    request: &Request,
+    tracking: &Tracking,
+    matches: &Matches,
+    vertices: &mut VertexCounts,
+    progress: &mut Progress,
+) -> Result<Demodulation> {
     progress.start("deformation", 0);
-    let carriers = request.bits * request.parameters.chip_rate;
-    let tracking = Tracking { reference: &reference, moved: &moved, ground: &ground, patches: &patches };
-    let (observed, disturbance) = tracking.follow(&matches, carriers, request)?;
-    let counts = VertexCounts { matched: observed.iter().flatten().count(), ..counts };
+    let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
+    let (observed, disturbance) = tracking.follow(matches, bits * parameters.chip_rate, request)?;
+    vertices.matched = observed.iter().flatten().count();
 
     progress.start("demodulation", patches.as_slice().len() as u64);
-    let carrier = Carrier::new(&request.key);
-    let (bits, parameters, step) = (request.bits, &request.parameters, progress.stepper());
-    let found = match request.demodulator {
+    let (carrier, step) = (Carrier::new(&request.key), progress.stepper());
+    Ok(match request.demodulator {
         Demodulator::Paper => {
-            let matched = tracking.displacements(&matches);
-            demodulation::paper(&patches, &carrier, &matched, bits, parameters, &step)?
+            let matched = tracking.displacements(matches);
+            demodulation::paper(patches, &carrier, &matched, bits, parameters, &step)?
         }
         Demodulator::Joint => {
-            demodulation::joint(&patches, &carrier, &observed, bits, parameters, &disturbance, &step)?
+            demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?
         }
-    };
-    let decision = decide(&found, request.expected.as_ref(), request.significance);
-    Ok(Report::new(request, &reference, registration, counts, Some(&found), decision, progress.finish()))
+    })
 }
 
 fn side(survey: &Survey) -> Side<'_> {
     Side { vertices: &survey.vertices, labels: &survey.labels, shapes: &survey.shapes }
 }
 
-/// The record must be of this very reference: the mesh of any other one differs.
-fn check_reference(request: &Request, reference: &Survey) -> Result<()> {
-    let Some(record) = &request.record else { return Ok(()) };
-    if record.reference.vertices_sha256 == reference.vertices.digest() {
+/// The record must be of this key, and its message what key and recipient give.
+///
+/// # Errors
+/// It is of another key, or was changed.
+pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
+    if record.key_id != key.id() {
+        return Err(Error::DoesNotBelong(format!(
+            "the record was made with key {}, and this is key {}: give the key it was made with",
+            record.key_id,
+            key.id()
+        )));
+    }
+    if record.subject()?.message(key) != record.message()? {
+        return Err(Error::DoesNotBelong(
+            "the record's message is not that of its recipient under this key: the record was changed".into(),
+        ));
+    }
+    Ok(())
+}
+
+/// The record must be of this very reference, whose vertices have this digest: the mesh of any other differs.
+///
+/// # Errors
+/// It is of another one.
+pub fn check_reference(record: &Record, request: &Request, reference: &Survey, digest: &str) -> Result<()> {
+    if record.reference.vertices_sha256 == digest {
         return Ok(());
     }
     Err(Error::DoesNotBelong(format!(

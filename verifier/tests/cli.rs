@@ -52,6 +52,7 @@ fn make_files(folder: &Path) {
     write("record_of_a_later_version.json", record.replace("_record\": 1", "_record\": 2").as_bytes());
     write("record_with_a_negative_amplitude.json", record.replace("0.1,", "-0.1,").as_bytes());
     write("record_with_a_comment.json", record.replacen("{", "{ \"comment\": \"\",", 1).as_bytes());
+    make_records(folder, &record);
     write("text.txt", b"This is no map.\n");
     write("truncated.gpkg", &fs::read(folder.join("marked.gpkg")).unwrap()[..100_000]);
     write(
@@ -59,6 +60,29 @@ fn make_files(folder: &Path) {
         b"<OGRVRTDataSource><OGRVRTLayer name='roads'><SrcDataSource relativeToVRT='1'>marked.gpkg\
           </SrcDataSource></OGRVRTLayer></OGRVRTDataSource>",
     );
+}
+
+/// A folder of three records that are good for the test vectors' key and map, and of four files that are not.
+fn make_records(folder: &Path, record: &str) {
+    let key = SecretKey::from_json(&read(folder, "key.json")).unwrap();
+    let of = |recipient: &str| {
+        let message = key.recipient_message(recipient).to_hex();
+        record.replace("ACME GmbH", recipient).replace("095abfcd9510d386660bcc7d0e7b8760", &message)
+    };
+    fs::create_dir_all(folder.join("records")).unwrap();
+    fs::create_dir_all(folder.join("no_records")).unwrap();
+    for (file, text) in [
+        ("acme.json", record.to_string()),
+        ("other.json", of("Another Ltd")),
+        ("third.json", of("Third SARL").replace("\"amplitude_m\": 0.1,", "\"amplitude_m\": 0.2,")),
+        ("another_key.json", record.replace("434471506306423b", "0000000000000000")),
+        ("another_reference.json", record.replace("ce0eba", "ce0ebb")),
+        ("changed.json", record.replace("ACME GmbH", "Another Ltd")),
+        ("no_record.json", "[1]".into()),
+        ("notes.txt", "no record either".into()),
+    ] {
+        fs::write(folder.join("records").join(file), text).unwrap();
+    }
 }
 
 fn read(folder: &Path, file: &str) -> String {

@@ -164,6 +164,12 @@ fn the_ranges_are_those_of_the_options() {
 
 /// The report of the real program on a suspect, by what it is.
 fn report(suspect: &str, flags: &[&str]) -> Value {
+    let (report, warnings) = report_and_warnings(suspect, flags);
+    assert_eq!(warnings, "");
+    report
+}
+
+fn report_and_warnings(suspect: &str, flags: &[&str]) -> (Value, String) {
     let file = match suspect {
         "marked map" => "vectors/marked.gpkg",
         "unmarked map" => "kotka.gpkg",
@@ -177,8 +183,8 @@ fn report(suspect: &str, flags: &[&str]) -> Value {
         .arg(file)
         .output()
         .unwrap();
-    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
-    serde_json::from_slice(&output.stdout).unwrap()
+    let warnings = String::from_utf8(output.stderr).unwrap();
+    (serde_json::from_slice(&output.stdout).unwrap(), warnings)
 }
 
 #[test]
@@ -197,10 +203,38 @@ fn reports_are_valid_for_every_verdict_and_both_demodulators() {
     }
 }
 
+/// vectors/ has one record, and two files that are none.
+#[test]
+fn reports_on_many_records_are_valid() {
+    for (suspect, verdict) in
+        [("marked map", "match"), ("unmarked map", "no-match"), ("another map", "inconclusive")]
+    {
+        let (report, warnings) = report_and_warnings(suspect, &["--records", "vectors"]);
+        assert_eq!(report["verdict"], verdict);
+        assert_eq!(
+            (&report["candidates"]["tried"], &report["candidates"]["skipped"]),
+            (&json!(1), &json!(2))
+        );
+        assert_eq!(report["candidates"]["list"][0]["recipient"], "ACME GmbH");
+        assert_eq!(report["candidates"]["list"][0]["p_value_log10"], report["p_value_log10"]);
+        assert_eq!(warnings.lines().count(), 2, "{warnings}");
+        assert_valid("report", &report);
+    }
+}
+
+#[test]
+fn equal_input_makes_equal_decoys() {
+    let decoys = || report("marked map", &["--record", "vectors/record.json"])["decoys"].clone();
+    assert_eq!(decoys(), decoys());
+    assert!(decoys()["tested"].as_f64().unwrap() > 10.0 * decoys()["largest"].as_f64().unwrap());
+}
+
 #[test]
 fn wrong_reports_are_refused() {
-    let report = report("marked map", &["--record", "vectors/record.json"]);
-    assert_closed("report", &report, &["", "/registration", "/vertices", "/parameters"]);
+    let report = report_and_warnings("marked map", &["--records", "vectors"]).0;
+    let objects = ["", "/registration", "/vertices", "/parameters", "/decoys", "/candidates"];
+    assert_closed("report", &report, &objects);
+    assert_closed("report", &report, &["/candidates/list/0"]);
     let changes = [
         ("/meshmark_report", json!("1")),
         ("/verdict", json!("no match")),
@@ -211,6 +245,13 @@ fn wrong_reports_are_refused() {
         ("/bit_errors", json!(-1)),
         ("/p_value_log10", json!(0.5)),
         ("/p_mark_log10", json!("-inf")),
+        ("/p_any_message_log10", json!(1)),
+        ("/candidates/tried", json!(0)),
+        ("/candidates/list", json!([])),
+        ("/candidates/list/0/p_value_log10", json!(0.5)),
+        ("/decoys/count", json!(1)),
+        ("/decoys/seed", json!("0F")),
+        ("/decoys/standard_deviation", json!(-1)),
         ("/registration/affine", json!([1, 0, 0, 0, 1])),
         ("/registration/rms_m", json!(-0.1)),
         ("/vertices/matched", json!(1.5)),

@@ -1,0 +1,302 @@
+//! Many records, one suspect: which recipient's copy is it?
+//!
+//! Records that were made with the same settings expect the same mark but for its message: the suspect is
+//! registered, matched and demodulated once for all of them.
+
+use crate::{
+    Error, Result,
+    decision::{Decision, Verdict, decide_among},
+    progress::Progress,
+    reading,
+    report::{Report, power_of_ten, printable},
+    verify::{Examination, Request, check_key, check_reference, examine, read_reference},
+};
+use meshmark_core::{key::SecretKey, message::Message, record::Record};
+use serde::Serialize;
+use std::path::Path;
+
+/// So many of the best are listed, and every match.
+const MOST_LISTED: usize = 20;
+
+/// The records that were tried, as the report has them.
+#[derive(Debug, Clone, Serialize)]
+pub struct Candidates {
+    /// How many; every p-value of the list is multiplied by it.
+    pub tried: usize,
+    /// How many files were no record of this key and reference.
+    pub skipped: usize,
+    /// The best, the most significant first.
+    pub list: Vec<Entry>,
+    #[serde(skip)]
+    matches: usize,
+}
+
+/// One of them.
+#[derive(Debug, Clone, Serialize)]
+pub struct Entry {
+    /// Name of its file.
+    pub record: String,
+    /// Its recipient; null when the message was given as bits.
+    pub recipient: Option<String>,
+    /// Its message, hexadecimal.
+    pub message: String,
+    /// log₁₀ p, times the number of candidates; null when nothing was decoded.
+    pub p_value_log10: Option<f64>,
+    /// How many decoded bits differ from its message; null when nothing was decoded.
+    pub bit_errors: Option<usize>,
+}
+
+impl Candidates {
+    /// What a person is told of them.
+    pub(crate) fn to_lines(&self) -> Vec<String> {
+        let skipped = match self.skipped {
+            0 => String::new(),
+            skipped => format!(", {skipped} files skipped"),
+        };
+        let mut lines = vec![format!("candidates:   {} records tried{skipped}", self.tried)];
+        let line = |label: &str, entry: &Entry| {
+            let p = entry.p_value_log10.map_or(String::new(), |p| format!(", p-value {}", power_of_ten(p)));
+            format!("{label:<13} {}{p}", entry.name())
+        };
+        match self.matches {
+            0 => lines.extend(self.list.first().map(|nearest| line("nearest:", nearest))),
+            matches => lines.extend(self.list[..matches].iter().map(|entry| line("match:", entry))),
+        }
+        lines
+    }
+}
+
+impl Entry {
+    fn name(&self) -> String {
+        let whose = match &self.recipient {
+            Some(recipient) => printable(recipient),
+            None => format!("message {}", self.message),
+        };
+        format!("{whose} ({})", printable(&self.record))
+    }
+}
+
+/// A record of the folder.
+struct Candidate {
+    file: String,
+    record: Record,
+    message: Message,
+}
+
+/// Candidates with the same settings.
+struct Group {
+    request: Request,
+    candidates: Vec<Candidate>,
+}
+
+/// What came of one candidate.
+struct Outcome {
+    group: usize,
+    candidate: Candidate,
+    decision: Decision,
+    bit_errors: Option<usize>,
+}
+
+/// Verifies one suspect against every record (*.json) of a folder. `request` says how; what it says of the mark
+/// is taken from the records. `warn` is told of every file that is skipped, and why.
+///
+/// # Errors
+/// As [`crate::verify()`], and when no record is usable.
+pub fn verify_candidates(
+    request: &Request,
+    folder: &Path,
+    progress: &mut Progress,
+    warn: &mut dyn FnMut(&str),
+) -> Result<Report> {
+    let mut skipped = 0;
+    let mut skip = |file: &str, reason: String| {
+        skipped += 1;
+        warn(&format!("{} is skipped: {reason}", folder.join(file).display()));
+    };
+    let groups = groups(request, read_all(folder, &request.key, &mut skip)?)?;
+    let mut examined: Vec<(Request, Examination)> = Vec::new();
+    let mut of_group = Vec::new();
+    for group in groups {
+        let Some((group, seen)) = examine_group(group, progress, &mut skip)? else { continue };
+        of_group.push(group.candidates);
+        examined.push((group.request, seen));
+    }
+    let outcomes = decide_all(of_group, &examined, request.significance);
+    let Some(best) = outcomes.first() else {
+        return Err(Error::Usage(format!(
+            "no file of {} is a record of this key and this reference: give the folder the records were written to",
+            folder.display()
+        )));
+    };
+    let (template, seen) = &examined[best.group];
+    let chosen = Request {
+        record: Some(best.candidate.record.clone()),
+        recipient: best.candidate.record.recipient.clone(),
+        expected: Some(best.candidate.message.clone()),
+        ..template.clone()
+    };
+    let report = Report::new(&chosen, seen, overall(&outcomes), progress.finish());
+    Ok(Report { candidates: Some(listed(&outcomes, skipped)), ..report })
+}
+
+/// Reads what can be read, in the order of file names.
+fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) -> Result<Vec<Candidate>> {
+    let unreadable = |error: std::io::Error| {
+        Error::Usage(format!("the folder {} cannot be read: {error}", folder.display()))
+    };
+    let mut files = Vec::new();
+    for entry in folder.read_dir().map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) && path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    let mut candidates = Vec::new();
+    for path in files {
+        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let checked = reading::record(&path).and_then(|record| {
+            check_key(&record, key)?;
+            let message = record.message()?;
+            Ok((record, message))
+        });
+        match checked {
+            Ok((record, message)) => candidates.push(Candidate { file, record, message }),
+            Err(error) => skip(&file, without_name(&error, &path)),
+        }
+    }
+    Ok(candidates)
+}
+
+fn without_name(error: &Error, path: &Path) -> String {
+    let text = error.to_string();
+    text.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&text).into()
+}
+
+/// Puts records together that differ in their message alone.
+fn groups(request: &Request, candidates: Vec<Candidate>) -> Result<Vec<Group>> {
+    let mut groups: Vec<Group> = Vec::new();
+    for candidate in candidates {
+        let (record, bits) = (&candidate.record, candidate.message.len());
+        let parameters = record.parameters()?;
+        let same = |group: &&mut Group| {
+            let r = &group.request;
+            r.parameters == parameters && r.layers == record.layers && r.srs == record.srs && r.bits == bits
+        };
+        if let Some(group) = groups.iter_mut().find(same) {
+            group.candidates.push(candidate);
+            continue;
+        }
+        let (layers, srs) = (record.layers.clone(), record.srs.clone());
+        let request = Request { parameters, layers, srs, bits, ..request.clone() };
+        groups.push(Group { request, candidates: vec![candidate] });
+    }
+    Ok(groups)
+}
+
+/// Demodulates the suspect for one group; `None` when no record of it is of this reference.
+fn examine_group(
+    mut group: Group,
+    progress: &mut Progress,
+    skip: &mut dyn FnMut(&str, String),
+) -> Result<Option<(Group, Examination)>> {
+    let reference = match read_reference(&group.request, progress) {
+        Ok(reference) => reference,
+        Err(Error::Usage(reason)) => {
+            group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.clone()));
+            return Ok(None);
+        }
+        Err(other) => return Err(other),
+    };
+    let digest = reference.vertices.digest();
+    group.candidates.retain(|candidate| {
+        let checked = check_reference(&candidate.record, &group.request, &reference, &digest);
+        if let Err(error) = &checked {
+            skip(&candidate.file, error.to_string());
+        }
+        checked.is_ok()
+    });
+    if group.candidates.is_empty() {
+        return Ok(None);
+    }
+    let seen = examine(&group.request, &reference, progress)?;
+    Ok(Some((group, seen)))
+}
+
+/// Decides on every candidate; the best comes first.
+fn decide_all(
+    of_group: Vec<Vec<Candidate>>,
+    examined: &[(Request, Examination)],
+    significance: f64,
+) -> Vec<Outcome> {
+    let tried = of_group.iter().map(Vec::len).sum();
+    let decide = |(group, candidate): (usize, Candidate)| {
+        let found = examined[group].1.found.as_ref();
+        let decision = match found {
+            Ok(found) => decide_among(found, &candidate.message, tried, significance),
+            Err(reason) => Decision::inconclusive(reason.clone()),
+        };
+        let bit_errors = found.ok().map(|found| found.message().errors(&candidate.message));
+        Outcome { group, candidate, decision, bit_errors }
+    };
+    let all = of_group
+        .into_iter()
+        .enumerate()
+        .flat_map(|(g, candidates)| candidates.into_iter().map(move |c| (g, c)));
+    let mut outcomes: Vec<Outcome> = all.map(decide).collect();
+    let rank = |outcome: &Outcome| {
+        let p = outcome.decision.p_value_log10().unwrap_or(f64::INFINITY);
+        (outcome.decision.verdict != Verdict::Match, p)
+    };
+    outcomes.sort_by(|a, b| {
+        let ((a_other, a_p), (b_other, b_p)) = (rank(a), rank(b));
+        let by_errors = a.bit_errors.cmp(&b.bit_errors);
+        a_other
+            .cmp(&b_other)
+            .then(a_p.total_cmp(&b_p))
+            .then(by_errors)
+            .then(a.candidate.file.cmp(&b.candidate.file))
+    });
+    outcomes
+}
+
+/// The answer to all of them: the grounds are those of the best.
+fn overall(outcomes: &[Outcome]) -> Decision {
+    let best = outcomes[0].decision.clone();
+    let matches = count_matches(outcomes);
+    let unclear = outcomes.iter().find(|o| o.decision.verdict == Verdict::Inconclusive);
+    match (matches, unclear) {
+        (0, Some(unclear)) => {
+            let reason = unclear.decision.reason.clone();
+            Decision { verdict: Verdict::Inconclusive, reason, ..best }
+        }
+        (0, None) => Decision {
+            reason: "a mark with this key and any of these messages would have shown, and none does".into(),
+            ..best
+        },
+        (1, _) => best,
+        _ => Decision {
+            reason: format!(
+                "the evidence for this key and {matches} of the records is below the significance"
+            ),
+            ..best
+        },
+    }
+}
+
+fn count_matches(outcomes: &[Outcome]) -> usize {
+    outcomes.iter().filter(|o| o.decision.verdict == Verdict::Match).count()
+}
+
+fn listed(outcomes: &[Outcome], skipped: usize) -> Candidates {
+    let matches = count_matches(outcomes);
+    let entry = |outcome: &Outcome| Entry {
+        record: outcome.candidate.file.clone(),
+        recipient: outcome.candidate.record.recipient.clone(),
+        message: outcome.candidate.message.to_hex(),
+        p_value_log10: outcome.decision.p_value_log10(),
+        bit_errors: outcome.bit_errors,
+    };
+    let list = outcomes.iter().take(MOST_LISTED.max(matches)).map(entry).collect();
+    Candidates { tried: outcomes.len(), skipped, list, matches }
+}

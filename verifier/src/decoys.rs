@@ -1,0 +1,48 @@
+//! Decoys: how keys that do not exist score on the same suspect. The p-values rest on the analytic null;
+//! this shows that it holds here.
+
+use meshmark_core::{demodulation::Demodulation, vertices::VertexTable};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+const COUNT: usize = 1000;
+
+/// Scores of decoy keys, in standard deviations of the null hypothesis.
+#[derive(Debug, Clone, Serialize)]
+pub struct Decoys {
+    /// How many.
+    pub count: usize,
+    /// SHA-256 of "meshmark decoys" and the digests of the suspect's and the reference's vertices: equal maps
+    /// have equal decoys, and nobody can choose them.
+    pub seed: String,
+    /// Mean of their scores.
+    pub mean: f64,
+    /// Standard deviation of their scores.
+    pub standard_deviation: f64,
+    /// The largest score.
+    pub largest: f64,
+    /// The score of the key and message in question; null when no message was expected.
+    pub tested: Option<f64>,
+}
+
+impl Decoys {
+    /// Scores decoys on a suspect; `None` where nothing was observed to move.
+    pub fn new(found: &Demodulation, suspect: &VertexTable, reference: &VertexTable) -> Option<Self> {
+        if found.chip_correlations.iter().all(|a| *a == 0.0) {
+            return None;
+        }
+        let text = format!("meshmark decoys {} {}", suspect.digest(), reference.digest());
+        let seed: [u8; 32] = Sha256::digest(text).into();
+        let scores = found.decoy_scores(COUNT, seed);
+        let mean = scores.iter().sum::<f64>() / COUNT as f64;
+        let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (COUNT - 1) as f64;
+        Some(Decoys {
+            count: COUNT,
+            seed: seed.iter().map(|byte| format!("{byte:02x}")).collect(),
+            mean,
+            standard_deviation: variance.sqrt(),
+            largest: scores.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            tested: None,
+        })
+    }
+}
