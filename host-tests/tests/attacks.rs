@@ -24,6 +24,7 @@ fn outcomes() -> &'static [Outcome] {
             wanted: Box::new(|case| SURVIVED.iter().chain(&OTHERS).any(|id| *id == case.id())),
             seed: 2003,
             workers: 2,
+            keep: None,
         };
         run(&Product::of_this_build().unwrap(), &plan, |_| ()).unwrap()
     })

@@ -34,6 +34,9 @@ struct Arguments {
     /// Processes at a time
     #[arg(long, default_value_t = 2)]
     jobs: usize,
+    /// New folder in which to keep references, marked copies, records, keys and suspects
+    #[arg(long)]
+    keep: Option<PathBuf>,
     /// Folder of `meshmark` and `gdalplugins/` [default: where this program is]
     #[arg(long)]
     tools: Option<PathBuf>,
@@ -67,6 +70,7 @@ fn run_all(arguments: Arguments) -> Result<()> {
         wanted: Box::new(wanted),
         seed: arguments.seed,
         workers: arguments.jobs.max(1),
+        keep: arguments.keep,
     };
     println!("seed {}, {} maps", plan.seed, plan.maps.len());
     std::fs::create_dir_all(&arguments.out)?;

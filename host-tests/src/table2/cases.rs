@@ -5,8 +5,6 @@ use std::sync::Arc;
 
 /// Innocent recipients asked about after a collusion.
 pub const INNOCENTS: usize = 4;
-/// The most copies that collude.
-pub const MOST_COPIES: usize = 8;
 
 /// One row of the experiment.
 #[derive(Debug, Clone)]
@@ -50,6 +48,14 @@ impl Case {
         }
     }
 
+    /// How many marked copies it takes.
+    pub fn copies(&self) -> usize {
+        match self {
+            Case::Collusion { copies } => *copies,
+            _ => 1,
+        }
+    }
+
     /// Which of the report's tables it belongs to.
     pub fn table(&self) -> Table {
         match self {
@@ -78,6 +84,6 @@ pub fn all(foreign: Arc<Map>) -> Vec<Case> {
     let mut cases: Vec<Case> = paper_rows().into_iter().map(attacked(true)).collect();
     cases.extend(extended_rows(foreign).into_iter().map(attacked(false)));
     cases.extend([Case::Unmarked, Case::MarkedAgain]);
-    cases.extend([2, 4, MOST_COPIES].map(|copies| Case::Collusion { copies }));
+    cases.extend([2, 4, 8].map(|copies| Case::Collusion { copies }));
     cases
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Result,
-    cases::{Case, INNOCENTS, MOST_COPIES, Table, all},
+    cases::{Case, INNOCENTS, Table, all},
     product::{Asked, Marking, Product, Report, write_key},
 };
 use crate::attacks::{Map, collusion, noise, similarity};
@@ -30,6 +30,8 @@ pub struct Plan {
     pub seed: u64,
     /// Processes at a time.
     pub workers: usize,
+    /// Where to keep references, copies, records, keys and suspects, to look into a verdict afterwards.
+    pub keep: Option<PathBuf>,
 }
 
 /// The answer to one question about one suspect.
@@ -100,41 +102,42 @@ struct Question {
 /// Maps that cannot be read, are not in metres or cannot be marked. A suspect that cannot be verified is an
 /// outcome, not an error.
 pub fn run(product: &Product, plan: &Plan, report: impl Fn(&Outcome) + Sync) -> Result<Vec<Outcome>> {
-    let folder = tempfile::tempdir()?;
-    let lab = Lab { product, folder: folder.path().into(), seed: plan.seed };
+    let temporary = tempfile::tempdir()?;
+    let folder = plan.keep.as_deref().unwrap_or(temporary.path());
+    std::fs::create_dir_all(folder)?;
+    if folder.read_dir()?.next().is_some() {
+        return Err(format!("the folder {} is not empty: name a new one", folder.display()).into());
+    }
+    let lab = Lab { product, folder: folder.into(), keep: plan.keep.is_some(), seed: plan.seed };
     write_key(&lab.key(), plan.seed)?;
     write_key(&lab.pirates_key(), plan.seed + 1)?;
     let (sheets, jobs) = lab.prepare(plan)?;
-    let outcomes = Mutex::new(Vec::new());
-    let next = AtomicUsize::new(0);
-    let work = |worker: usize| -> Result<()> {
-        while let Some((sheet, case)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let answers = lab.run_case(&sheets[*sheet], case, worker).map_err(|error| {
-                format!(
-                    "{}, chip rate {}, case {}: {error}",
-                    sheets[*sheet].name,
-                    sheets[*sheet].chip_rate,
-                    case.id()
-                )
-            })?;
-            answers.iter().for_each(&report);
-            outcomes.lock().expect("no worker panics with the lock").push((*sheet, case.id(), answers));
+    let (answered, next) = (Mutex::new(Vec::new()), AtomicUsize::new(0));
+    let work = || -> Result<()> {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some((sheet, case)) = jobs.get(number) else { return Ok(()) };
+            let Sheet { name, chip_rate, .. } = &sheets[*sheet];
+            let outcomes = lab
+                .run_case(&sheets[*sheet], case)
+                .map_err(|error| format!("{name}, chip rate {chip_rate}, case {}: {error}", case.id()))?;
+            outcomes.iter().for_each(&report);
+            answered.lock().expect("no worker panics with the lock").push((number, outcomes));
         }
-        Ok(())
     };
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..plan.workers).map(|w| scope.spawn(move || work(w))).collect();
+        let workers: Vec<_> = (0..plan.workers).map(|_| scope.spawn(work)).collect();
         workers.into_iter().try_for_each(|worker| worker.join().expect("workers return their errors"))
     })?;
-    let mut outcomes = outcomes.into_inner().expect("no worker panics with the lock");
-    let order = |sheet: usize, id: &str| jobs.iter().position(|(s, case)| *s == sheet && case.id() == id);
-    outcomes.sort_by_key(|(sheet, id, _)| order(*sheet, id));
-    Ok(outcomes.into_iter().flat_map(|(_, _, answers)| answers).collect())
+    let mut answered = answered.into_inner().expect("no worker panics with the lock");
+    answered.sort_by_key(|(number, _)| *number);
+    Ok(answered.into_iter().flat_map(|(_, outcomes)| outcomes).collect())
 }
 
 struct Lab<'a> {
     product: &'a Product,
     folder: PathBuf,
+    keep: bool,
     seed: u64,
 }
 
@@ -157,13 +160,16 @@ impl Lab<'_> {
         let (mut sheets, mut jobs) = (Vec::new(), Vec::new());
         for (number, (path, map)) in plan.maps.iter().zip(&maps).enumerate() {
             let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            let reference = self.folder.join(format!("{number}.gpkg"));
+            if sheets.iter().any(|sheet: &Sheet| sheet.name == name) {
+                return Err(format!("two maps are called {name}: rename one").into());
+            }
+            let reference = self.folder.join(format!("{name}.gpkg"));
             map.write(&reference)?;
             let cases: Vec<Case> = all(foreign(&maps, number)?).into_iter().filter(&plan.wanted).collect();
-            let colludes = cases.iter().any(|case| matches!(case, Case::Collusion { .. }));
+            let most_copies = cases.iter().map(Case::copies).max().unwrap_or(1);
             for &chip_rate in &plan.chip_rates {
-                let copies = (1..=if colludes { MOST_COPIES } else { 1 })
-                    .map(|copy| self.mark(&format!("{number}-{chip_rate}"), &reference, chip_rate, copy));
+                let sheet = format!("{name}-{chip_rate}");
+                let copies = (1..=most_copies).map(|copy| self.mark(&sheet, &reference, chip_rate, copy));
                 let copies = copies.collect::<Result<_>>()?;
                 jobs.extend(cases.iter().map(|case| (sheets.len(), case.clone())));
                 sheets.push(Sheet { name: name.clone(), chip_rate, reference: reference.clone(), copies });
@@ -182,9 +188,8 @@ impl Lab<'_> {
     }
 
     /// Makes the suspect of a case and asks about everybody.
-    fn run_case(&self, sheet: &Sheet, case: &Case, worker: usize) -> Result<Vec<Outcome>> {
-        let folder = tempfile::Builder::new().prefix(&format!("worker{worker}-")).tempdir_in(&self.folder)?;
-        let suspect = folder.path().join("suspect.gpkg");
+    fn run_case(&self, sheet: &Sheet, case: &Case) -> Result<Vec<Outcome>> {
+        let suspect = self.folder.join(format!("{}-{}-{}.gpkg", sheet.name, sheet.chip_rate, case.id()));
         let seed = seed_of(self.seed, &sheet.name, &case.id());
         let questions = self.make_suspect(sheet, case, seed, &suspect)?;
         let mut outcomes = Vec::new();
@@ -195,6 +200,9 @@ impl Lab<'_> {
                 let seconds = started.elapsed().as_secs_f64();
                 outcomes.push(outcome(sheet, case, seed, question, demodulator, answer, seconds));
             }
+        }
+        if !self.keep {
+            std::fs::remove_file(&suspect)?; // a whole run makes a thousand
         }
         Ok(outcomes)
     }

@@ -67,7 +67,7 @@ impl Family {
             outcomes.iter().filter(|o| self.ids.contains(&o.case.as_str())).collect();
         let mut series = Vec::new();
         for (shade, c) in distinct(of_family.iter().map(|o| o.chip_rate)).into_iter().enumerate() {
-            let colours = [["#9ecae1", "#08519c", "#888888"], ["#fdae6b", "#a63603", "#bbbbbb"]][shade % 2];
+            let colours = [["#9ecae1", "#08519c", "#4292c6"], ["#fdae6b", "#a63603", "#f16913"]][shade % 2];
             for (demodulator, colour) in DEMODULATORS.into_iter().zip(colours) {
                 let points = points(&of_family, |outcomes| {
                     cell(
