@@ -4,7 +4,11 @@ use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
-use std::{collections::BTreeSet, path::Path, sync::Mutex};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
 
 /// What a suspect may be: local files of plain formats. No format that points at other data (VRT,
 /// SQL, network), for a suspect may be made to mislead; and not MESHMARK.
@@ -94,6 +98,7 @@ pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<(Su
         return Err(Error::Unreadable(format!("the suspect {path} is not a file here: give a local file")));
     }
     forbid_network().map_err(|error| Error::Unreadable(format!("GDAL takes no option: {error}")))?;
+    check_table(path)?;
     let dataset = open("suspect", path, Some(SUSPECT_DRIVERS))?;
     check_plain(path, &dataset)?;
     let target = reference.crs.as_ref().map_or(Target::Raw, Target::Crs);
@@ -114,6 +119,27 @@ fn forbid_network() -> gdal::errors::Result<()> {
         ("SPATIALITE_SECURITY", "strict"),
     ] {
         gdal::config::set_thread_local_config_option(option, value)?;
+    }
+    Ok(())
+}
+
+/// Refuses MapInfo tables that are made of others, which may be anywhere.
+fn check_table(path: &Path) -> Result<()> {
+    let is_table = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tab"));
+    let tables: Vec<PathBuf> = match path.read_dir() {
+        Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| is_table(p)).collect(),
+        Err(_) => is_table(path).then(|| path.into()).into_iter().collect(),
+    };
+    for table in tables.iter().filter(|table| table.is_file()) {
+        let Ok(bytes) = std::fs::read(table) else { continue }; // GDAL will say why
+        let text = String::from_utf8_lossy(&bytes).to_lowercase();
+        let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
+        if seamless || text.contains("create view") {
+            return Err(Error::Unreadable(format!(
+                "the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr",
+                table.display()
+            )));
+        }
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ use meshmark_core::{
 use meshmark_dataset::{Dimension, Label, LabelFields, MOST_VERTICES, Selection, Target, survey};
 use meshmark_verifier::{
     affine::Affine,
-    decision::{Decision, Verdict, decide},
+    decision::{Decision, Verdict, decide, decide_among},
     matching::Matcher,
     registration::{Side, Start, register},
 };
@@ -126,6 +126,21 @@ fn of_a_thousand_other_recipients_of_the_same_key_none_is_accused() {
     let others = (0..1000).map(|i| case.key.recipient_message(&format!("recipient {i}")));
     let accused = others.filter(|message| case.decide(&found, message).verdict != Verdict::NoMatch);
     assert_eq!(accused.count(), 0);
+}
+
+#[test]
+fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
+    let case = Case::kotka();
+    let message = |name: &str| case.key.recipient_message(name);
+    let parameters = Parameters::default();
+    let other =
+        embed(&case.reference, &case.ground, &case.key, &message("Another Ltd"), &parameters).unwrap();
+    let pairs = case.marked.iter().zip(&other.coords);
+    let mean: Vec<[f64; 2]> = pairs.map(|(a, b)| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]).collect();
+    let found = case.demodulate(&mean, &case.key);
+    let matches = |name: &str| decide_among(&found, &message(name), 1000, 1e-6).verdict == Verdict::Match;
+    assert!(matches("ACME GmbH") && matches("Another Ltd"));
+    assert!(!(0..998).any(|i| matches(&format!("recipient {i}"))));
 }
 
 #[test]

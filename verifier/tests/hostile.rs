@@ -1,0 +1,218 @@
+//! Suspects that are made to mislead, to stall or to fetch: each gets an answer or a refusal, and nothing else
+//! is read.
+
+use gdal::{
+    Dataset, DatasetOptions, DriverManager, GdalOpenFlags,
+    spatial_ref::SpatialRef,
+    vector::{Geometry, LayerAccess, LayerOptions, OGRwkbGeometryType::wkbPoint, sql::Dialect},
+};
+use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Target, survey};
+use std::{
+    fs,
+    net::TcpListener,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+use tempfile::TempDir;
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
+}
+
+/// What `meshmark verify` says of a suspect against the test vectors.
+fn verify(suspect: &Path) -> (Option<i32>, String) {
+    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_meshmark"))
+        .env("GDAL_DRIVER_PATH", "none")
+        .args(["verify", "--key"])
+        .arg(fixture("vectors/key.json"))
+        .arg("--record")
+        .arg(fixture("vectors/record.json"))
+        .arg("--reference")
+        .arg(fixture("kotka.gpkg"))
+        .arg(suspect)
+        .output()
+        .unwrap();
+    (status.code(), [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat())
+}
+
+/// Asserts an exit code and a part of the text.
+fn assert_answer(suspect: &Path, code: i32, part: &str) {
+    let (found, text) = verify(suspect);
+    assert!(found == Some(code) && text.contains(part), "{}: {found:?}\n{text}", suspect.display());
+}
+
+fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// The vertices of the marked map.
+fn marked() -> Vec<[f64; 2]> {
+    let selection = Selection {
+        layers: None,
+        srs: None,
+        labels: LabelFields::None,
+        target: Target::Own,
+        most_vertices: MOST_VERTICES,
+        last_failure: &|| None,
+    };
+    let map = survey(&Dataset::open(fixture("vectors/marked.gpkg")).unwrap(), &selection).unwrap();
+    map.vertices.coords().to_vec()
+}
+
+/// Points in EPSG:3067 as GeoJSON, with `crs` in the place of the CRS.
+fn points(coords: &[[f64; 2]], crs: &str) -> String {
+    let feature = |[x, y]: &[f64; 2]| {
+        format!(
+            r#"{{"type":"Feature","properties":{{}},"geometry":{{"type":"Point","coordinates":[{x},{y}]}}}}"#
+        )
+    };
+    let features: Vec<String> = coords.iter().map(feature).collect();
+    format!(r#"{{"type":"FeatureCollection","crs":{crs},"features":[{}]}}"#, features.join(","))
+}
+
+const EPSG_3067: &str = r#"{"type":"name","properties":{"name":"EPSG:3067"}}"#;
+
+#[test]
+fn the_vertices_alone_as_points_are_a_match() {
+    let folder = TempDir::new().unwrap();
+    assert_answer(&write(&folder, "points.geojson", &points(&marked(), EPSG_3067)), 0, "MATCH");
+}
+
+#[test]
+fn ten_times_as_many_vertices_do_not_hide_the_mark() {
+    let folder = TempDir::new().unwrap();
+    let mut coords = marked();
+    let count = coords.len() as u64;
+    let noise = |i: u64| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);
+    let ([left, bottom], [width, height]) = ([496_888.0, 6_710_500.0], [1068.0, 1058.0]);
+    coords.extend((0..9 * count).map(|i| [left + width * noise(i), bottom + height * noise(i + 1_000_003)]));
+    assert_answer(&write(&folder, "crowded.geojson", &points(&coords, EPSG_3067)), 0, "MATCH");
+}
+
+#[test]
+fn nothing_few_points_and_another_place_are_inconclusive() {
+    let folder = TempDir::new().unwrap();
+    let elsewhere: Vec<[f64; 2]> = marked().iter().map(|[x, y]| [x + 1e5, y - 2e5]).collect();
+    for (name, coords) in
+        [("empty.geojson", &[][..]), ("few.geojson", &marked()[..20]), ("elsewhere.geojson", &elsewhere)]
+    {
+        assert_answer(&write(&folder, name, &points(coords, EPSG_3067)), 3, "was not registered");
+    }
+}
+
+#[test]
+fn no_address_in_a_suspect_is_visited() {
+    let folder = TempDir::new().unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.set_nonblocking(true).unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let link = format!(r#"{{"type":"link","properties":{{"href":"{url}/crs","type":"ogcwkt"}}}}"#);
+    let name = format!(r#"{{"type":"name","properties":{{"name":"{url}/crs"}}}}"#);
+    let gml = format!(
+        r#"<?xml version="1.0"?><!DOCTYPE x [<!ENTITY e SYSTEM "{url}/entity">]>
+<ogr:FeatureCollection xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"
+ xsi:schemaLocation="http://ogr.maptools.org/ {url}/wfs?SERVICE=WFS&amp;REQUEST=DescribeFeatureType&amp;TYPENAME=a"
+ xmlns:ogr="http://ogr.maptools.org/" xmlns:gml="http://www.opengis.net/gml" xmlns:xlink="http://www.w3.org/1999/xlink">
+<gml:featureMember><ogr:a fid="a.0"><ogr:geometryProperty><gml:Point srsName="{url}/srs"><gml:coordinates>1,2</gml:coordinates></gml:Point></ogr:geometryProperty></ogr:a></gml:featureMember>
+<gml:featureMember><ogr:a fid="a.1"><ogr:geometryProperty xlink:href="{url}/map#b"/></ogr:a></gml:featureMember>
+</ogr:FeatureCollection>"#
+    );
+    let kml = format!(
+        r#"<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document>
+<NetworkLink><Link><href>{url}/more.kml</href></Link></NetworkLink>
+<Placemark><styleUrl>{url}/style.kml#a</styleUrl><Point><coordinates>1,2</coordinates></Point></Placemark>
+</Document></kml>"#
+    );
+    for (file, text) in [
+        ("link.geojson", points(&marked(), &link)),
+        ("name.geojson", points(&marked(), &name)),
+        ("schema.gml", gml),
+        ("link.kml", kml),
+    ] {
+        let (code, text) = verify(&write(&folder, file, &text));
+        assert!(listener.accept().is_err(), "{file}: somebody called");
+        assert!([Some(3), Some(5)].contains(&code), "{file}: {code:?} {text}");
+    }
+}
+
+/// The marked vertices as points in a database, whose schema may have one more entry.
+fn database(folder: &TempDir, name: &str, driver: &str, entry: Option<&str>) -> PathBuf {
+    let path = folder.path().join(name);
+    let driver = DriverManager::get_driver_by_name(driver).unwrap();
+    let mut dataset = driver.create_vector_only(&path).unwrap();
+    let srs = SpatialRef::from_epsg(3067).unwrap();
+    let mut transaction = dataset.start_transaction().unwrap();
+    let mut layer = transaction
+        .create_layer(LayerOptions { name: "points", srs: Some(&srs), ty: wkbPoint, options: None })
+        .unwrap();
+    for [x, y] in marked() {
+        let mut point = Geometry::empty(wkbPoint).unwrap();
+        point.add_point_2d((x, y));
+        layer.create_feature(point).unwrap();
+    }
+    transaction.commit().unwrap();
+    drop(dataset);
+    let Some(entry) = entry else { return path };
+    let open_flags = GdalOpenFlags::GDAL_OF_UPDATE | GdalOpenFlags::GDAL_OF_VECTOR;
+    let copy = Dataset::open_ex(&path, DatasetOptions { open_flags, ..Default::default() }).unwrap();
+    let run = |sql: &str| drop(copy.execute_sql(sql, None, Dialect::DEFAULT).unwrap());
+    run("PRAGMA writable_schema = 1");
+    run(&format!(
+        "INSERT INTO sqlite_master (type, name, tbl_name, rootpage, sql) VALUES ('table', 'x', 'x', 0, '{entry}')"
+    ));
+    path
+}
+
+#[test]
+fn a_database_with_tables_of_its_own_is_read_and_one_that_points_at_files_is_refused() {
+    let folder = TempDir::new().unwrap();
+    for (driver, extension) in [("GPKG", "gpkg"), ("SQLite", "sqlite")] {
+        let plain = database(&folder, &format!("plain.{extension}"), driver, None);
+        assert_answer(&plain, 0, "MATCH");
+        for (i, entry) in [
+            "CREATE VIRTUAL TABLE x USING VirtualOGR(''/etc/passwd'')",
+            "CREATE VIRTUAL TABLE x USING VirtualText(''/etc/passwd'', ''UTF-8'')",
+            "create/**/virtual/**/table x /* using rtree */ using/**/VirtualShape(''/tmp/a'', ''UTF-8'', 1)",
+        ]
+        .iter()
+        .enumerate()
+        {
+            let path = database(&folder, &format!("{i}.{extension}"), driver, Some(entry));
+            assert_answer(&path, 5, "may point at other files");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_plain_map_is_refused() {
+    let folder = TempDir::new().unwrap();
+    assert_answer(Path::new("MESHMARK:marked.gpkg"), 5, "is not a file here");
+    assert_answer(Path::new("/dev/null"), 5, "is not a file here");
+    assert_answer(Path::new("/vsicurl/http://127.0.0.1/a.gpkg"), 5, "is not a file here");
+    for (file, text) in [
+        ("map.vrt", "<OGRVRTDataSource/>"),
+        ("map.xml", "<OGRWFSDataSource><URL>http://127.0.0.1</URL></OGRWFSDataSource>"),
+        ("map.json", "{}"),
+        ("empty.shp", ""),
+        ("empty.gpkg", ""),
+    ] {
+        assert_answer(&write(&folder, file, text), 5, "cannot be opened");
+    }
+    assert_answer(folder.path(), 5, "");
+}
+
+#[test]
+fn a_table_that_is_made_of_other_tables_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let header = "!table\n!version 100\n!charset Neutral\n\nDefinition Table\n";
+    for rest in [
+        "  Type NATIVE Charset \"Neutral\"\n  Fields 1\n    a Char (254) ;\n\
+         begin_metadata\n\"\\IsSeamless\" = \"TRUE\"\nend_metadata\n",
+        "create view both as\nSelect a\nFrom one, two\nWhere one.a=two.a\n",
+    ] {
+        let path = write(&folder, "many.tab", &format!("{header}{rest}"));
+        assert_answer(&path, 5, "is made of other tables");
+    }
+}
