@@ -11,6 +11,7 @@ use meshmark_host_tests::table2::{
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
+    sync::Mutex,
 };
 
 /// Rerun Table 2 of Ohbuchi, Ueda and Endoh 2003 with the driver and the verifier of this build.
@@ -74,8 +75,20 @@ fn run_all(arguments: Arguments) -> Result<()> {
     };
     println!("seed {}, {} maps", plan.seed, plan.maps.len());
     std::fs::create_dir_all(&arguments.out)?;
-    let outcomes = run(&product, &plan, print)?;
-    write(&arguments.out, &outcomes, plan.seed, &product.version()?)
+    let (out, version) = (arguments.out, product.version()?);
+    // A run takes long; one that is stopped leaves the tables of what it has.
+    let so_far = Mutex::new(Vec::new());
+    let outcomes = run(&product, &plan, |outcome| {
+        print(outcome);
+        let mut so_far = so_far.lock().expect("no worker panics with the lock");
+        so_far.push(outcome.clone());
+        if so_far.len().is_multiple_of(100) {
+            write(&out, &so_far, plan.seed, &version).unwrap_or_else(|error| eprintln!("table2: {error}"));
+        }
+    })?;
+    write(&out, &outcomes, plan.seed, &version)?;
+    println!("written to {}", out.join("table2.md").display());
+    Ok(())
 }
 
 /// Files as they are given, folders as the GeoPackages in them.
@@ -119,6 +132,5 @@ fn write(folder: &Path, outcomes: &[Outcome], seed: u64, version: &str) -> Resul
     for (file, svg) in figures::all(outcomes) {
         std::fs::write(folder.join(file), svg)?;
     }
-    println!("written to {}", folder.join("table2.md").display());
     Ok(())
 }

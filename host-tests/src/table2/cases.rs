@@ -3,6 +3,8 @@
 use crate::attacks::{Map, Row, extended_rows, paper_rows};
 use std::sync::Arc;
 
+/// The demodulators of the command, the paper's first.
+pub const DEMODULATORS: [&str; 2] = ["paper", "joint"];
 /// Innocent recipients asked about after a collusion.
 pub const INNOCENTS: usize = 4;
 
@@ -56,6 +58,14 @@ impl Case {
         }
     }
 
+    /// The demodulators it is measured with: colluders are many, so they only meet the default one.
+    pub fn demodulators(&self) -> &'static [&'static str] {
+        match self {
+            Case::Collusion { .. } => &["joint"],
+            _ => &DEMODULATORS,
+        }
+    }
+
     /// Which of the report's tables it belongs to.
     pub fn table(&self) -> Table {
         match self {
@@ -67,7 +77,7 @@ impl Case {
 }
 
 /// The tables of the report.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Table {
     /// Table 2 of the paper.

@@ -157,10 +157,10 @@ impl Lab<'_> {
             check_metres(path)?;
             maps.push(Arc::new(noise::snap(&Map::read(path)?, PRECISION_M)));
         }
-        let (mut sheets, mut jobs) = (Vec::new(), Vec::new());
+        let (mut sheets, mut jobs): (Vec<Sheet>, Vec<Job>) = (Vec::new(), Vec::new());
         for (number, (path, map)) in plan.maps.iter().zip(&maps).enumerate() {
             let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            if sheets.iter().any(|sheet: &Sheet| sheet.name == name) {
+            if sheets.iter().any(|sheet| sheet.name == name) {
                 return Err(format!("two maps are called {name}: rename one").into());
             }
             let reference = self.folder.join(format!("{name}.gpkg"));
@@ -175,6 +175,7 @@ impl Lab<'_> {
                 sheets.push(Sheet { name: name.clone(), chip_rate, reference: reference.clone(), copies });
             }
         }
+        jobs.sort_by_key(|(_, case)| case.table()); // the paper's table first, for all maps
         Ok((sheets, jobs))
     }
 
@@ -194,7 +195,7 @@ impl Lab<'_> {
         let questions = self.make_suspect(sheet, case, seed, &suspect)?;
         let mut outcomes = Vec::new();
         for question in &questions {
-            for demodulator in ["paper", "joint"] {
+            for demodulator in case.demodulators() {
                 let started = Instant::now();
                 let answer = self.ask(sheet, question, demodulator, &suspect);
                 let seconds = started.elapsed().as_secs_f64();

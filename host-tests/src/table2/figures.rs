@@ -1,8 +1,8 @@
 //! The figures: which attacks make a line, and which lines a plot.
 
 use super::{
+    cases::DEMODULATORS,
     experiment::Outcome,
-    markdown::DEMODULATORS,
     paper,
     plot::{Plot, Series},
     summary::{cell, distinct},

@@ -1,15 +1,12 @@
 //! The report as Markdown.
 
 use super::{
-    cases::Table,
+    cases::{DEMODULATORS, Table},
     experiment::Outcome,
     paper,
     summary::{Cell, bit_error_percent, cell, distinct, is_match},
 };
 use std::fmt::Write;
-
-/// Demodulators, in the order of the columns.
-pub const DEMODULATORS: [&str; 2] = ["paper", "joint"];
 
 /// All tables.
 pub fn report(outcomes: &[Outcome], seed: u64, version: &str) -> String {
@@ -116,6 +113,9 @@ fn special(outcomes: &[Outcome]) -> String {
                     of_table.iter().filter(is).copied().collect()
                 };
                 let (guilty, innocent) = (of(true), of(false));
+                if guilty.len() + innocent.len() == 0 {
+                    continue;
+                }
                 let found = |outcomes: &[&Outcome]| {
                     format!("{} of {}", outcomes.iter().filter(|o| is_match(o)).count(), outcomes.len())
                 };
