@@ -33,7 +33,7 @@ impl Carrier {
     }
 }
 
-/// The message bit that coefficient `i` (1 … m·c) carries; coefficient 0 is the mean and carries none.
+/// The channel bit that coefficient `i` (1 … m·c) carries; coefficient 0 is the mean and carries none.
 pub fn bit_of_coefficient(i: usize, chip_rate: usize) -> usize {
     (i - 1) / chip_rate
 }

@@ -66,7 +66,7 @@ impl Deformation {
     }
 
     /// The hyper-parameters of greatest marginal likelihood on a few patches. The mark enters with its
-    /// covariance over all chips and messages, α² E Eᵀ. `carriers` is m·c.
+    /// covariance over all chips and messages, α² E Eᵀ. `carriers` is what [`Patches::carriers`] says.
     ///
     /// # Errors
     /// [`crate::Error::NoConvergence`].

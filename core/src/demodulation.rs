@@ -7,6 +7,7 @@
 use crate::{
     Result,
     carrier::{Carrier, bit_of_coefficient},
+    code::{Code, Decoded},
     deformation::{Found, Observed, Prediction, factor},
     message::Message,
     options::Parameters,
@@ -26,16 +27,18 @@ use rayon::prelude::*;
 /// Displacements are never trusted to better than this.
 const LEAST_NOISE_M: f64 = 1e-3;
 
-/// What a demodulator found.
+/// What a demodulator found out about the channel bits: those that the code makes of the message.
 #[derive(Debug, Clone)]
 pub struct Demodulation {
-    /// b̂_j, m estimates of ±1; 0 is no idea.
+    /// How the message became the channel bits.
+    pub code: Code,
+    /// b̂_j, an estimate of ±1 for every channel bit; 0 is no idea.
     pub estimate: Vec<f64>,
     /// v_j, the variance of each.
     pub variance: Vec<f64>,
     /// q_j = Σ p_i a_i over the chips of bit j.
     pub scores: Vec<f64>,
-    /// a_i, the correlation with every chip before its sign: patches × 2 axes × m·c.
+    /// a_i, the correlation with every chip before its sign: patches × 2 axes × carriers.
     pub chip_correlations: Vec<f64>,
     /// What Σ p_i b′_i a_i is expected to be when the mark is there at its full amplitude.
     pub expected_sum: f64,
@@ -44,20 +47,31 @@ pub struct Demodulation {
 }
 
 impl Demodulation {
-    /// Log-likelihood ratios of the bits, 2 b̂_j / v_j, natural logarithm, positive = 1.
+    /// Log-likelihood ratios of the channel bits, 2 b̂_j / v_j, natural logarithm, positive = 1.
     pub fn log_likelihood_ratios(&self) -> Vec<f64> {
         self.estimate.iter().zip(&self.variance).map(|(b, v)| 2.0 * b / v).collect()
     }
 
+    /// The message, and how sure it is.
+    pub fn decode(&self) -> Decoded {
+        self.code.decode(&self.log_likelihood_ratios())
+    }
+
     /// The most likely message.
     pub fn message(&self) -> Message {
-        Message::from_signs(&self.estimate)
+        self.decode().message
+    }
+
+    /// How many channel bits differ from those of this message.
+    pub fn channel_bit_errors(&self, message: &Message) -> usize {
+        let signs = self.code.encode(message);
+        signs.iter().zip(&self.estimate).filter(|(sign, b)| (**sign > 0.0) != (**b > 0.0)).count()
     }
 
     /// How many standard deviations the evidence for this message under this key is above that of a
     /// random key on the same suspect.
     pub fn mark_score(&self, message: &Message) -> f64 {
-        ratio(dot(&message.signs(), &self.scores), self.null_deviation())
+        ratio(dot(&self.code.encode(message), &self.scores), self.null_deviation())
     }
 
     /// The [`Self::mark_score`] a mark of full amplitude would be expected to show.
@@ -66,9 +80,11 @@ impl Demodulation {
     }
 
     /// How many standard deviations the estimate agrees better with this message than with a random
-    /// message under the same key: bᵀb̂ / |b̂|, at most √m.
+    /// message under the same key: b′ᵀb̂ / |b̂| over channel bits, at most the square root of their number.
+    /// Its mean is 0 and its variance 1 with either code: the bits of a random LDPC code word are not all
+    /// independent, but any four of them are (its dual distance is more than 4, `code.rs` proves it).
     pub fn recipient_score(&self, message: &Message) -> f64 {
-        ratio(dot(&message.signs(), &self.estimate), dot(&self.estimate, &self.estimate).sqrt())
+        ratio(dot(&self.code.encode(message), &self.estimate), dot(&self.estimate, &self.estimate).sqrt())
     }
 
     /// The [`Self::mark_score`] of `count` decoy keys on the same suspect: random signs instead of chips, those
@@ -88,7 +104,7 @@ impl Demodulation {
         (0..count).into_par_iter().map(score).collect()
     }
 
-    /// Σ_j q_j² / n_j with n_j = Σ a_i² over the chips of bit j, and the number of bits it runs over. For a key
+    /// Σ_j q_j² / n_j with n_j = Σ a_i² over the chips of channel bit j, and the number of bits it runs over. For a key
     /// that was not used it is chi-squared with so many degrees of freedom; any message raises it.
     pub fn key_score(&self, chip_rate: usize) -> (f64, usize) {
         let bits = self.scores.len();
@@ -119,10 +135,10 @@ fn ratio(a: f64, b: f64) -> f64 {
 /// coefficients, and the chips of a bit are summed over axes and patches.
 ///
 /// `observed` holds the displacement of every reference vertex in canonical order, metres, or `None`;
-/// `progress` is called once for every patch.
+/// `bits` is the length of the message; `progress` is called once for every patch.
 ///
 /// # Errors
-/// [`crate::Error::TooManyCoefficients`] when the message does not fit.
+/// Those of [`Patches::carriers`] when the message does not fit.
 pub fn paper(
     patches: &Patches,
     carrier: &Carrier,
@@ -167,6 +183,7 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     let chips_of_bit = count / job.bits as f64;
     let variance = |j: usize| if gain(j) > 0.0 { spread2 * chips_of_bit / gain(j).powi(2) } else { 1.0 };
     Demodulation {
+        code: job.parameters.code,
         variance: (0..job.bits).map(variance).collect(),
         estimate,
         scores: sums.scores,
@@ -213,10 +230,11 @@ pub fn joint(
         Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
     })?;
     let amplitude_m = parameters.amplitude_m;
-    let gram = Mat::from_fn(bits, bits, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
+    let gram = Mat::from_fn(job.bits, job.bits, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
     let product: Vec<f64> = sums.scores.iter().map(|q| amplitude_m * q).collect();
     let (estimate, variance) = posterior(gram, &product);
     Ok(Demodulation {
+        code: parameters.code,
         estimate,
         variance,
         scores: sums.scores,
@@ -239,8 +257,8 @@ struct Job<'a> {
     patches: &'a Patches,
     carrier: &'a Carrier,
     observed: &'a Observed,
+    /// Channel bits.
     bits: usize,
-    /// m·c.
     carriers: usize,
     parameters: &'a Parameters,
     progress: &'a (dyn Fn(usize) + Sync),
@@ -248,7 +266,7 @@ struct Job<'a> {
 
 /// What the patches add up to.
 struct Sums {
-    /// m × m for [`joint`], m × 1 for [`paper`].
+    /// m × m for [`joint`], m × 1 for [`paper`], of m channel bits.
     gram: Mat<f64>,
     scores: Vec<f64>,
     correlations: Vec<f64>,
@@ -295,13 +313,13 @@ impl<'a> Job<'a> {
         patches: &'a Patches,
         carrier: &'a Carrier,
         observed: &'a Observed,
-        bits: usize,
+        message_bits: usize,
         parameters: &'a Parameters,
         progress: &'a (dyn Fn(usize) + Sync),
     ) -> Result<Self> {
         assert_eq!(observed.len(), patches.vertex_count(), "one observation for every reference vertex");
-        patches.check_capacity(bits, parameters.chip_rate)?;
-        let carriers = bits * parameters.chip_rate;
+        let carriers = patches.carriers(message_bits, parameters)?;
+        let bits = carriers / parameters.chip_rate;
         Ok(Job { patches, carrier, observed, bits, carriers, parameters, progress })
     }
 
@@ -365,6 +383,7 @@ mod tests {
     fn found() -> Demodulation {
         let correlation = |i: usize| (i % 3) as f64 * (1.0 + (i % 7) as f64);
         Demodulation {
+            code: Code::Repetition,
             estimate: vec![0.0; 3],
             variance: vec![1.0; 3],
             scores: vec![30.0, -40.0, 0.0],

@@ -3,6 +3,7 @@
 use crate::{
     Error, Result,
     carrier::{Carrier, bit_of_coefficient},
+    code::Code,
     ground::Ground,
     key::SecretKey,
     message::Message,
@@ -39,7 +40,7 @@ pub struct Marked {
 /// the output grid. The message is read back from the result before it is returned.
 ///
 /// # Errors
-/// Everything of [`Patches::new`], [`Patches::check_capacity`], a PRECISION that is coarser than
+/// Everything of [`Patches::new`], [`Patches::carriers`], a PRECISION that is coarser than
 /// TOLERANCE, and [`Error::MessageLost`].
 pub fn embed(
     table: &VertexTable,
@@ -50,15 +51,16 @@ pub fn embed(
 ) -> Result<Marked> {
     check_precision(table, ground, parameters)?;
     let patches = Patches::new(table, ground, parameters.patch_size)?;
-    patches.check_capacity(message.len(), parameters.chip_rate)?;
-    let job = Job { table, ground, carrier: Carrier::new(key), signs: message.signs(), parameters };
+    let carriers = patches.carriers(message.len(), parameters)?;
+    let signs = parameters.code.encode(message);
+    let job = Job { table, ground, carrier: Carrier::new(key), signs, carriers, parameters };
     let marked: Vec<MarkedPatch> = patches
         .as_slice()
         .par_iter()
         .enumerate()
         .map(|(number, patch)| job.mark(number, patch))
         .collect::<Result<_>>()?;
-    check_message(message, &marked)?;
+    check_message(message, parameters.code, &marked)?;
 
     let mut coords = vec![[0.0; 2]; table.len()];
     for (patch, marked) in patches.as_slice().iter().zip(&marked) {
@@ -74,21 +76,22 @@ struct Job<'a> {
     table: &'a VertexTable,
     ground: &'a Ground,
     carrier: Carrier,
+    /// b′, the channel bits.
     signs: Vec<f64>,
+    carriers: usize,
     parameters: &'a Parameters,
 }
 
 struct MarkedPatch {
     coords: Vec<[f64; 2]>,
-    /// q_j, what the paper's detector sums for bit j in this patch.
+    /// q_j, what the paper's detector sums for channel bit j in this patch.
     scores: Vec<f64>,
 }
 
 impl Job<'_> {
     fn mark(&self, number: usize, patch: &Patch) -> Result<MarkedPatch> {
-        let carriers = self.signs.len() * self.parameters.chip_rate;
-        let basis = Basis::low_frequencies(patch, carriers + 1)?;
-        let chips = [0, 1].map(|axis| self.carrier.chips(number, axis, carriers));
+        let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
+        let chips = [0, 1].map(|axis| self.carrier.chips(number, axis, self.carriers));
         let wanted = chips.each_ref().map(|chips| basis.synthesise(&self.coefficients(chips)));
         let place = |(v, &vertex): (usize, &u32)| {
             self.place(self.table.coords()[vertex as usize], [wanted[0][v], wanted[1][v]])
@@ -192,12 +195,12 @@ fn check_precision(table: &VertexTable, ground: &Ground, parameters: &Parameters
     Ok(())
 }
 
-fn check_message(message: &Message, marked: &[MarkedPatch]) -> Result<()> {
-    let mut sums = vec![0.0; message.len()];
+fn check_message(message: &Message, code: Code, marked: &[MarkedPatch]) -> Result<()> {
+    let mut sums = vec![0.0; marked[0].scores.len()];
     for patch in marked {
         sums.iter_mut().zip(&patch.scores).for_each(|(sum, score)| *sum += score);
     }
-    match Message::from_signs(&sums).errors(message) {
+    match code.decode(&sums).message.errors(message) {
         0 => Ok(()),
         errors => Err(Error::MessageLost { errors, bits: message.len() }),
     }

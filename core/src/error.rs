@@ -1,3 +1,5 @@
+use crate::code::Code;
+
 /// What can go wrong in the algorithm. Every message says what would have been legal.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs)] // the messages are the documentation
@@ -17,11 +19,17 @@ pub enum Error {
     )]
     Collinear { vertices: usize },
     #[error(
-        "a message of {bits} bits with CHIP_RATE={chip_rate} needs {} coefficients, but the smallest patch \
-         ({vertices} vertices) has {}: use CHIP_RATE={} or less, a shorter message or a larger PATCH_SIZE",
-        .bits * .chip_rate, .vertices - 1, (.vertices - 1) / .bits
+        "a message of {bits} bits with {}CHIP_RATE={chip_rate} needs {} coefficients, but the smallest patch \
+         ({vertices} vertices) has {}: use {}",
+        if *.code == Code::Ldpc { "CODE=LDPC and " } else { "" },
+        .code.expansion() * .bits * .chip_rate, .vertices - 1, what_fits(*.code, *.bits, *.vertices)
     )]
-    TooManyCoefficients { bits: usize, chip_rate: usize, vertices: usize },
+    TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize },
+    #[error(
+        "CODE=LDPC carries a message of exactly 128 bits, not {bits}: use 32 hexadecimal digits, a RECIPIENT, \
+         or CODE=REPETITION"
+    )]
+    CodeLength { bits: usize },
     #[error(
         "PRECISION={precision} is {metres} m on the ground here, more than TOLERANCE={tolerance_m} m: \
          use a finer PRECISION or a larger TOLERANCE"
@@ -46,6 +54,13 @@ pub enum Error {
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+fn what_fits(code: Code, bits: usize, vertices: usize) -> String {
+    let most = (vertices - 1) / (code.expansion() * bits);
+    let chip_rate = if most > 0 { format!("CHIP_RATE={most} or less, ") } else { String::new() };
+    let message = if code == Code::Ldpc { "CODE=REPETITION" } else { "a shorter message" };
+    format!("{chip_rate}{message} or a larger PATCH_SIZE")
+}
 
 fn patch_size_hint(vertices: usize) -> String {
     let smallest = crate::options::PATCH_SIZE_RANGE.0;

@@ -2,7 +2,7 @@
 //!
 //! The method is that of R. Ohbuchi, H. Ueda and S. Endoh, *Watermarking 2D Vector Maps in the
 //! Mesh-Spectral Domain*, Shape Modeling International 2003 ("the paper"). One module per step, in
-//! the order the data flows: [`vertices`] → [`mesh`] → [`patches`] → [`spectrum`] → [`carrier`] →
+//! the order the data flows: [`vertices`] → [`mesh`] → [`patches`] → [`spectrum`] → [`code`] → [`carrier`] →
 //! [`embedding`], and back through [`demodulation`].
 //!
 //! ```
@@ -37,6 +37,7 @@
 #![warn(missing_docs)]
 
 pub mod carrier;
+pub mod code;
 pub mod deformation;
 pub mod demodulation;
 pub mod embedding;

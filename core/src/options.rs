@@ -1,7 +1,7 @@
 //! The watermark options: one table that makes the driver's option list, the parser, the flags of
 //! the command line and the table in the docs.
 
-use crate::{Error, Result, key::SecretKey, message::Message};
+use crate::{Error, Result, code::Code, key::SecretKey, message::Message};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
 /// need minutes and gigabytes a solve.
@@ -16,6 +16,8 @@ pub enum Kind {
     Number(f64, f64),
     /// A whole number between two bounds, both legal.
     Integer(usize, usize),
+    /// One of these words, in any case.
+    Choice(&'static [&'static str]),
 }
 
 /// One row of the table.
@@ -74,11 +76,18 @@ pub const OPTIONS: &[OptionSpec] = &[
         "Amplitude of every coefficient, metres on the ground",
     ),
     row(
+        "CODE",
+        Kind::Choice(&Code::NAMES),
+        Some("REPETITION"),
+        true,
+        "REPETITION carries the message bits as they are; LDPC turns 128 of them into 256 that correct errors",
+    ),
+    row(
         "CHIP_RATE",
         Kind::Integer(1, 2048),
-        Some("2"),
+        None,
         true,
-        "Coefficients that carry each message bit, per patch and axis",
+        "Coefficients that carry each of those bits, per patch and axis; by default 2, with CODE=LDPC 1",
     ),
     row(
         "PATCH_SIZE",
@@ -128,7 +137,9 @@ pub fn spec(name: &str) -> Option<&'static OptionSpec> {
 pub struct Parameters {
     /// α, amplitude per coefficient, metres on the ground.
     pub amplitude_m: f64,
-    /// c, coefficients per message bit, patch and axis.
+    /// How the message becomes the channel bits.
+    pub code: Code,
+    /// c, coefficients per channel bit, patch and axis.
     pub chip_rate: usize,
     /// d, the smallest number of vertices in a patch.
     pub patch_size: usize,
@@ -189,13 +200,19 @@ impl Options {
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(pairs)?;
         let precision = values.number("PRECISION")?;
+        let subject = values.subject()?;
+        let code = values.code()?;
+        if let Some(Subject::Message(message)) = &subject {
+            code.channel_bits(message.len())?;
+        }
         Ok(Options {
             key_path: values.text("KEY")?,
-            subject: values.subject()?,
+            subject,
             parameters: Parameters {
                 amplitude_m: values.number("AMPLITUDE")?.expect("has a default"),
-                chip_rate: values.integer("CHIP_RATE")?,
-                patch_size: values.integer("PATCH_SIZE")?,
+                code,
+                chip_rate: values.integer("CHIP_RATE")?.unwrap_or(code.default_chip_rate()),
+                patch_size: values.integer("PATCH_SIZE")?.expect("has a default"),
                 tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
                 precision,
             },
@@ -270,14 +287,20 @@ impl<'a> Values<'a> {
         }
     }
 
-    fn integer(&self, name: &str) -> Result<usize> {
+    fn integer(&self, name: &str) -> Result<Option<usize>> {
         let spec = spec(name).expect("a row of the table");
         let Kind::Integer(least, most) = spec.kind else { unreachable!("{name} is an integer") };
-        let value = self.given(name).or(spec.default).expect("has a default");
+        let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
         match value.trim().parse::<usize>() {
-            Ok(number) if (least..=most).contains(&number) => Ok(number),
+            Ok(number) if (least..=most).contains(&number) => Ok(Some(number)),
             _ => Err(Error::Option(format!("{name}={value} is not a whole number from {least} to {most}"))),
         }
+    }
+
+    fn code(&self) -> Result<Code> {
+        let name = self.given("CODE").or(spec("CODE").and_then(|row| row.default)).expect("has a default");
+        Code::from_name(name.trim())
+            .ok_or_else(|| Error::Option(format!("CODE={name} is unknown: use {}", Code::NAMES.join(" or "))))
     }
 }
 
@@ -292,9 +315,15 @@ fn option_xml(option: &OptionSpec) -> String {
         Kind::Text => ("string", String::new()),
         Kind::Number(above, most) => ("float", format!(" min='{above}' max='{most}'")),
         Kind::Integer(least, most) => ("int", format!(" min='{least}' max='{most}'")),
+        Kind::Choice(_) => ("string-select", String::new()),
+    };
+    let values: String = match option.kind {
+        Kind::Choice(words) => words.iter().map(|word| format!("<Value>{word}</Value>")).collect(),
+        _ => String::new(),
     };
     let default = option.default.map_or(String::new(), |d| format!(" default='{d}'"));
-    format!("<Option name='{}' type='{kind}'{range}{default} description='{}'/>", option.name, option.help)
+    let attributes = format!("type='{kind}'{range}{default} description='{}'", option.help);
+    format!("<Option name='{}' {attributes}>{values}</Option>", option.name)
 }
 
 /// The options as a Markdown table, for the docs.
@@ -318,7 +347,11 @@ mod tests {
     fn defaults_are_those_of_the_table() {
         let p = Parameters::default();
         assert_eq!((p.amplitude_m, p.chip_rate, p.patch_size), (0.10, 2, 480));
-        assert_eq!((p.tolerance_m, p.precision), (0.75, None));
+        assert_eq!((p.tolerance_m, p.precision, p.code), (0.75, None, Code::Repetition));
+        let chip_rate = |pairs: &[_]| Options::parse(pairs.iter().copied()).unwrap().parameters.chip_rate;
+        assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 2, with CODE=LDPC 1"));
+        assert_eq!((chip_rate(&[]), chip_rate(&[("CODE", "LDPC")])), (2, 1));
+        assert_eq!(chip_rate(&[("CODE", "ldpc"), ("CHIP_RATE", "3")]), 3);
     }
 
     #[test]
@@ -329,6 +362,9 @@ mod tests {
         assert!(error(&[("TOLERANCE", "inf")]).contains("at most 1000000"));
         assert!(error(&[("CHIP_RATE", "2.5")]).contains("whole number from 1"));
         assert!(error(&[("PATCH_SIZE", "3")]).contains("from 16 to 4096"));
+        assert!(error(&[("CODE", "morse")]).contains("CODE=morse is unknown: use REPETITION or LDPC"));
+        let short = error(&[("CODE", "LDPC"), ("MESSAGE", "0123456789abcdef")]);
+        assert!(short.contains("exactly 128 bits, not 64: use 32 hexadecimal digits"), "{short}");
         assert!(error(&[("COLOUR", "red")]).contains("unknown option COLOUR: use KEY, "));
         assert!(error(&[("KEY", "a"), ("key", "b")]).contains("given twice"));
         assert!(error(&[("RECIPIENT", " ")]).contains("RECIPIENT is empty"));

@@ -1,7 +1,7 @@
 //! Patches: the map cut into pieces of nearly `patch_size` vertices, each with its connected graph
 //! (paper, section 3.2; the split and the bridges are ours, see docs/method.md).
 
-use crate::{Error, Result, ground::Ground, mesh::Mesh, vertices::VertexTable};
+use crate::{Error, Result, ground::Ground, mesh::Mesh, options::Parameters, vertices::VertexTable};
 use rayon::prelude::*;
 
 /// One patch: some vertices of the map and the mesh edges among them.
@@ -54,16 +54,19 @@ impl Patches {
         &self.positions_m
     }
 
-    /// Checks that m·c coefficients besides the mean fit into the smallest patch.
+    /// How many coefficients of a patch and axis carry a message of `bits` bits: one for every channel bit and
+    /// chip. They fit into the smallest patch besides the mean.
     ///
     /// # Errors
-    /// [`Error::TooManyCoefficients`].
-    pub fn check_capacity(&self, bits: usize, chip_rate: usize) -> Result<()> {
+    /// [`Error::TooManyCoefficients`] or [`Error::CodeLength`].
+    pub fn carriers(&self, bits: usize, parameters: &Parameters) -> Result<usize> {
+        let Parameters { code, chip_rate, .. } = *parameters;
+        let carriers = code.channel_bits(bits)? * chip_rate;
         let smallest = self.patches.iter().map(|p| p.vertices.len()).min().unwrap_or(0);
-        if bits * chip_rate >= smallest {
-            return Err(Error::TooManyCoefficients { bits, chip_rate, vertices: smallest });
+        if carriers >= smallest {
+            return Err(Error::TooManyCoefficients { code, bits, chip_rate, vertices: smallest });
         }
-        Ok(())
+        Ok(carriers)
     }
 
     /// Checks the invariants: every vertex in one patch, ascending, edges sorted, patches connected.
@@ -231,8 +234,9 @@ mod tests {
     #[test]
     fn capacity_counts_the_mean_as_taken() {
         let cut = Patches::new(&scattered(600), &METRES, 300).unwrap();
-        assert_eq!(cut.check_capacity(299, 1), Ok(()));
-        assert!(cut.check_capacity(300, 1).unwrap_err().to_string().contains("has 299"));
+        let p = Parameters { chip_rate: 1, ..Parameters::default() };
+        assert_eq!(cut.carriers(299, &p), Ok(299));
+        assert!(cut.carriers(300, &p).unwrap_err().to_string().contains("has 299"));
     }
 
     #[test]

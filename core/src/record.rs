@@ -2,6 +2,7 @@
 
 use crate::{
     Error, Result,
+    code::Code,
     embedding::Displacement,
     message::Message,
     options::{Parameters, Subject},
@@ -28,6 +29,8 @@ pub struct Record {
     pub message: String,
     /// α.
     pub amplitude_m: f64,
+    /// How the message becomes the channel bits.
+    pub code: Code,
     /// c.
     pub chip_rate: usize,
     /// d.
@@ -90,7 +93,9 @@ impl Record {
             return Err(Error::Record(format!("version {found} instead of {VERSION}")));
         }
         record.parameters()?;
-        record.message()?;
+        record.parameters()?;
+        let bits = record.message()?.len();
+        record.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;
         Ok(record)
     }
 
@@ -99,19 +104,20 @@ impl Record {
         serde_json::to_string_pretty(self).expect("a record is JSON") + "\n"
     }
 
-    /// The numbers that shaped the mark.
+    /// The parameters that shaped the mark.
     ///
     /// # Errors
     /// [`Error::Record`] when one of them is out of range.
     pub fn parameters(&self) -> Result<Parameters> {
-        let numbers = [
+        let values = [
+            ("CODE", self.code.name()),
             ("AMPLITUDE", self.amplitude_m.to_string()),
             ("CHIP_RATE", self.chip_rate.to_string()),
             ("PATCH_SIZE", self.patch_size.to_string()),
             ("TOLERANCE", self.tolerance_m.to_string()),
         ];
         let precision = self.precision_crs_units.map(|p| ("PRECISION", p.to_string()));
-        let pairs = numbers.iter().chain(&precision).map(|(name, value)| (*name, value.as_str()));
+        let pairs = values.iter().chain(&precision).map(|(name, value)| (*name, value.as_str()));
         let options = crate::options::Options::parse(pairs).map_err(|e| Error::Record(e.to_string()))?;
         Ok(options.parameters)
     }

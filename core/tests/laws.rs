@@ -3,6 +3,7 @@
 use faer::Mat;
 use meshmark_core::{
     carrier::Carrier,
+    code::Code,
     deformation::Deformation,
     demodulation::{self, Demodulation},
     embedding::embed,
@@ -66,6 +67,28 @@ fn read_back(
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn a_coded_message_is_read_when_a_sixth_of_the_vertices_is_gone(
+        points in vertices(),
+        bytes in prop::array::uniform16(any::<u8>()),
+    ) {
+        let table = VertexTable::new(points).unwrap();
+        let p = Parameters { patch_size: 290, chip_rate: 1, code: Code::Ldpc, ..Parameters::default() };
+        let message = Message::from_bytes(&bytes);
+        let moved = embed(&table, &METRES, &key(), &message, &p).unwrap().coords;
+        let mut seen = observed(&table, &METRES, &moved);
+        for displacement in seen.iter_mut().step_by(6) {
+            *displacement = None;
+        }
+        let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+        let disturbance = Deformation::none(0.02).predict(&patches, &seen, 256, p.amplitude_m);
+        let found = demodulation::joint(
+            &patches, &Carrier::new(&key()), &seen, 128, &p, &disturbance, &|_| ()).unwrap();
+        prop_assert_eq!(found.estimate.len(), 256);
+        prop_assert_eq!(found.message(), message.clone());
+        prop_assert!(found.recipient_score(&message) > 8.0 && found.mark_score(&message) > 8.0);
+    }
 
     #[test]
     fn analysis_after_synthesis_is_the_identity(

@@ -159,9 +159,8 @@ impl Marking {
         })
     }
 
-    /// m·c.
     fn carriers(&self) -> usize {
-        self.message.len() * self.parameters.chip_rate
+        self.patches.carriers(self.message.len(), &self.parameters).expect("it fits")
     }
 
     fn basis(&self, number: usize) -> Basis {
@@ -191,7 +190,7 @@ impl Marking {
 
     /// α p_i b′_j of one axis, after a 0 for the mean.
     fn coefficients(&self, chips: &[f64]) -> Vec<f64> {
-        let signs = self.message.signs();
+        let signs = self.parameters.code.encode(&self.message);
         let bit = |i: usize| signs[bit_of_coefficient(i + 1, self.parameters.chip_rate)];
         let modulated = chips.iter().enumerate().map(|(i, chip)| self.parameters.amplitude_m * chip * bit(i));
         std::iter::once(0.0).chain(modulated).collect()

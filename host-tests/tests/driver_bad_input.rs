@@ -80,6 +80,15 @@ fn bad_hexadecimal_digits_are_shown() {
 }
 
 #[test]
+fn a_code_that_does_not_fit_the_message_says_what_does() {
+    let options = [&KEY[..], &["-oo", "CODE=LDPC", "-oo", "MESSAGE=0123456789abcdef"]].concat();
+    refuses(&Host::new(), &map(), &options, &["exactly 128 bits, not 64", "32 hexadecimal digits"]);
+    refuses_map(&Host::new(), &map(), &["-oo", "CODE=MORSE"], &["CODE=MORSE", "REPETITION or LDPC"]);
+    let words = ["CODE=LDPC and CHIP_RATE=3 needs 768", "CHIP_RATE=2 or less, CODE=REPETITION or a larger"];
+    refuses_map(&Host::new(), &map(), &["-oo", "CODE=LDPC", "-oo", "CHIP_RATE=3"], &words);
+}
+
+#[test]
 fn numbers_that_are_none_or_out_of_range_are_named_with_what_is_legal() {
     let host = Host::new();
     for (option, words) in [

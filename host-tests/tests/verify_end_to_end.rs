@@ -73,6 +73,25 @@ fn the_message_is_read_without_a_record() {
 }
 
 #[test]
+fn a_coded_message_is_read_with_a_record_and_without() {
+    let host = marked("kotka.gpkg", &["-oo", "CODE=LDPC"]);
+    let how = ["--code", "ldpc", "--recipient", "ACME GmbH", "marked.gpkg"];
+    for more in [&["--record", "acme.json", "marked.gpkg"][..], &how[..]] {
+        let report = matches(&host, "map.gpkg", more);
+        assert_eq!(
+            (&report["parameters"]["code"], &report["parameters"]["chip_rate"]),
+            (&"ldpc".into(), &1.into())
+        );
+        assert_eq!(report["code"]["parity_holds"], true);
+        assert_eq!(report["code"]["decoder"], "belief-propagation");
+        assert_eq!(report["bits"].as_array().unwrap().len(), 128);
+    }
+    // Under another code there is no such mark.
+    let (run, report) = verify(&host, "map.gpkg", &["--recipient", "ACME GmbH", "marked.gpkg"]);
+    assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
+}
+
+#[test]
 fn one_layer_of_many_can_be_marked_and_verified() {
     let host = marked("helsinki.gpkg", &["-oo", "LAYERS=buildings,roads"]);
     let report = matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);

@@ -196,6 +196,7 @@ fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
         },
         message: subject.message(key).to_hex(),
         amplitude_m: parameters.amplitude_m,
+        code: parameters.code,
         chip_rate: parameters.chip_rate,
         patch_size: parameters.patch_size,
         tolerance_m: parameters.tolerance_m,

@@ -11,7 +11,7 @@ use crate::{
     report::{Report, power_of_ten, printable},
     verify::{Examination, Request, check_key, check_reference, examine, read_reference},
 };
-use meshmark_core::{key::SecretKey, message::Message, record::Record};
+use meshmark_core::{demodulation::Demodulation, key::SecretKey, message::Message, record::Record};
 use serde::Serialize;
 use std::path::Path;
 
@@ -230,13 +230,15 @@ fn decide_all(
     significance: f64,
 ) -> Vec<Outcome> {
     let tried = of_group.iter().map(Vec::len).sum();
+    let found = |group: usize| examined[group].1.found.as_ref();
+    let messages: Vec<_> =
+        (0..examined.len()).map(|group| found(group).ok().map(Demodulation::message)).collect();
     let decide = |(group, candidate): (usize, Candidate)| {
-        let found = examined[group].1.found.as_ref();
-        let decision = match found {
+        let decision = match found(group) {
             Ok(found) => decide_among(found, &candidate.message, tried, significance),
             Err(reason) => Decision::inconclusive(reason.clone()),
         };
-        let bit_errors = found.ok().map(|found| found.message().errors(&candidate.message));
+        let bit_errors = messages[group].as_ref().map(|message| message.errors(&candidate.message));
         Outcome { group, candidate, decision, bit_errors }
     };
     let all = of_group

@@ -240,6 +240,7 @@ fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> 
             "RECIPIENT" => alone.subject == recorded.subject,
             "MESSAGE" => matches!(&alone.subject, Some(Subject::Message(m)) if *m == record.message()?),
             "AMPLITUDE" => alone.parameters.amplitude_m == recorded.parameters.amplitude_m,
+            "CODE" => alone.parameters.code == recorded.parameters.code,
             "CHIP_RATE" => alone.parameters.chip_rate == recorded.parameters.chip_rate,
             "PATCH_SIZE" => alone.parameters.patch_size == recorded.parameters.patch_size,
             "TOLERANCE" => alone.parameters.tolerance_m == recorded.parameters.tolerance_m,

@@ -4,7 +4,9 @@
 //! the sum Σ p_i b′_i a_i then has mean 0 and variance Σ a_i², whatever happened to the map, so the score is
 //! standard normal (a sum of thousands of independent signs; its tail is at most 3.18 times the normal
 //! one, Bentkus and Dzindzalieta 2015). *Is it this recipient?* Under the right key, an unrelated
-//! recipient has a random message: bᵀb̂ has mean 0 and variance |b̂|². The larger p counts.
+//! recipient has a random message: b′ᵀb̂ over the channel bits has mean 0 and variance |b̂|². With
+//! `CODE=LDPC` b′ is a random code word, not independent signs: any four of its bits are independent, and over random
+//! messages the tail is that of the normal distribution (tests of core's `code.rs`). The larger p counts.
 
 use crate::survival;
 use meshmark_core::{demodulation::Demodulation, message::Message};
@@ -81,7 +83,7 @@ pub fn decide_among(found: &Demodulation, message: &Message, tried: usize, signi
         (Verdict::Inconclusive, reason)
     } else if p_mark.max(p_recipient) < significance.log10() {
         (Verdict::Match, "the evidence for this key and this message is below the significance".into())
-    } else if would_show(found, bits, significance) {
+    } else if would_show(found, significance) {
         (Verdict::NoMatch, "a mark with this key and message would have shown, and it does not".into())
     } else {
         (Verdict::Inconclusive, "too little of the map was matched for a mark to show".into())
@@ -98,10 +100,10 @@ pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64
 }
 
 /// Whether a full mark would be expected to pass both tests with a margin.
-fn would_show(found: &Demodulation, bits: usize, significance: f64) -> bool {
+fn would_show(found: &Demodulation, significance: f64) -> bool {
     let needed = (-2.0 * significance.ln()).sqrt(); // above the normal quantile
-    // Were the mark there, b̂ would be near ±1 on the bits that are known at all.
-    let known = found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum::<f64>().min(bits as f64);
+    // Were the mark there, b̂ would be near ±1 on the channel bits that are known at all.
+    let known: f64 = found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum();
     // In the untouched reference nothing moved, so there is no noise either to measure a mark against.
     let nothing_moved = found.expected_sum > 0.0 && found.chip_correlations.iter().all(|a| *a == 0.0);
     let visible = nothing_moved || found.expected_mark_score() > needed + POWER_MARGIN;
@@ -111,9 +113,11 @@ fn would_show(found: &Demodulation, bits: usize, significance: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use meshmark_core::code::Code;
 
     fn evidence(estimate: Vec<f64>, scores: Vec<f64>) -> Demodulation {
         Demodulation {
+            code: Code::Repetition,
             variance: vec![0.1; estimate.len()],
             estimate,
             scores,

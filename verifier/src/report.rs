@@ -8,7 +8,10 @@ use crate::{
     registration::Registration,
     verify::{Demodulator, Examination, Request},
 };
-use meshmark_core::demodulation::Demodulation;
+use meshmark_core::{
+    code::{Code, Decoder},
+    demodulation::Demodulation,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -23,10 +26,12 @@ pub struct Report {
     pub reason: String,
     /// The message as decoded, hexadecimal; null when nothing was decoded.
     pub message: Option<String>,
-    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1.
+    /// Log-likelihood ratios of its bits after decoding, natural logarithm, positive = 1.
     pub bits: Vec<f64>,
     /// How many bits differ from the expected message.
     pub bit_errors: Option<usize>,
+    /// How the message was decoded.
+    pub code: CodeEntry,
     /// The larger of the next two, times the number of candidates.
     pub p_value_log10: Option<f64>,
     /// log₁₀ p of this much evidence under a random key.
@@ -55,6 +60,19 @@ pub struct Report {
     pub suspect_crs: Vec<String>,
 }
 
+/// How the message was decoded.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct CodeEntry {
+    /// The code.
+    pub name: Code,
+    /// How many channel bits differ from those of the expected message, before decoding.
+    pub channel_bit_errors: Option<usize>,
+    /// Whether belief propagation came to a word that passes all parity checks; null without a code that has any.
+    pub parity_holds: Option<bool>,
+    /// What found the message; null when nothing was decoded.
+    pub decoder: Option<Decoder>,
+}
+
 /// Distinct vertices.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct VertexCounts {
@@ -74,6 +92,7 @@ pub struct ReportParameters {
     pub recipient: Option<String>,
     pub expected_message: Option<String>,
     pub amplitude_m: f64,
+    pub code: Code,
     pub chip_rate: usize,
     pub patch_size: usize,
     pub tolerance_m: f64,
@@ -96,8 +115,14 @@ impl Report {
         seconds: &BTreeMap<&'static str, f64>,
     ) -> Self {
         let (found, expected) = (seen.found.as_ref().ok(), request.expected.as_ref());
-        let message = found.map(Demodulation::message);
+        let decoded = found.map(Demodulation::decode);
         let tested = found.zip(expected).map(|(found, expected)| found.mark_score(expected));
+        let code = CodeEntry {
+            name: request.parameters.code,
+            channel_bit_errors: found.zip(expected).map(|(found, m)| found.channel_bit_errors(m)),
+            parity_holds: decoded.as_ref().and_then(|decoded| decoded.parity_holds),
+            decoder: decoded.as_ref().map(|decoded| decoded.decoder),
+        };
         Report {
             meshmark_report: 1,
             verdict: decision.verdict,
@@ -108,9 +133,10 @@ impl Report {
             candidates: None,
             decoys: seen.decoys.clone().map(|decoys| Decoys { tested, ..decoys }),
             reason: decision.reason,
-            bit_errors: message.as_ref().zip(expected).map(|(m, expected)| m.errors(expected)),
-            message: message.map(|m| m.to_hex()),
-            bits: found.map(Demodulation::log_likelihood_ratios).unwrap_or_default(),
+            message: decoded.as_ref().map(|decoded| decoded.message.to_hex()),
+            bit_errors: decoded.as_ref().zip(expected).map(|(decoded, m)| decoded.message.errors(m)),
+            bits: decoded.map(|decoded| decoded.message_llrs).unwrap_or_default(),
+            code,
             registration: seen.registration.clone(),
             vertices: seen.vertices,
             parameters: ReportParameters::new(request, seen),
@@ -136,6 +162,7 @@ impl Report {
                 format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
             });
             lines.push(format!("message:      {message}{errors}"));
+            lines.extend(self.code.to_text());
             // Of noise, too, bits are made; their odds suppose a mark.
             lines.push(match self.verdict == Verdict::Match || self.shows_key() {
                 true => format!("bits:         {}", certainty(&self.bits)),
@@ -206,6 +233,19 @@ impl Report {
     }
 }
 
+impl CodeEntry {
+    /// What LDPC did, for a person.
+    fn to_text(self) -> Option<String> {
+        let how = match self.decoder? {
+            Decoder::Sign => return None,
+            Decoder::BeliefPropagation => "belief propagation, all parity checks hold",
+            Decoder::OrderedStatistics => "ordered statistics, the most likely code word of those near",
+        };
+        let errors = self.channel_bit_errors.map_or(String::new(), |e| format!("{e} code bits were wrong; "));
+        Some(format!("code:         {errors}read by {how}"))
+    }
+}
+
 impl ReportParameters {
     fn new(request: &Request, seen: &Examination) -> Self {
         let p = &request.parameters;
@@ -214,6 +254,7 @@ impl ReportParameters {
             recipient: request.recipient.clone(),
             expected_message: request.expected.as_ref().map(|m| m.to_hex()),
             amplitude_m: p.amplitude_m,
+            code: p.code,
             chip_rate: p.chip_rate,
             patch_size: p.patch_size,
             tolerance_m: p.tolerance_m,

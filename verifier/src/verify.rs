@@ -136,7 +136,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
 
     progress.start("patches", 0);
     let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size)?;
-    patches.check_capacity(request.bits, request.parameters.chip_rate)?;
+    patches.carriers(request.bits, &request.parameters)?; // before the map is searched for
 
     progress.start("registration", 0);
     let (radius_m, start) = (request.radius_m, request.registration);
@@ -186,7 +186,8 @@ fn demodulate(
 ) -> Result<Demodulation> {
     progress.start("deformation", 0);
     let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
-    let (observed, disturbance) = tracking.follow(matches, bits * parameters.chip_rate, request)?;
+    let carriers = patches.carriers(bits, parameters)?;
+    let (observed, disturbance) = tracking.follow(matches, carriers, request)?;
     vertices.matched = observed.iter().flatten().count();
 
     progress.start("demodulation", patches.as_slice().len() as u64);

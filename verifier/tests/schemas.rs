@@ -1,6 +1,7 @@
 //! docs/*.schema.json describe what the programs write, and nothing else.
 
 use meshmark_core::{
+    code::Code,
     embedding::Displacement,
     options::{Kind, OPTIONS},
     record::{DisplacementEntry, Record, Reference},
@@ -76,6 +77,7 @@ fn record() -> Record {
         recipient: None,
         message: "095abfcd9510d386660bcc7d0e7b8760".into(),
         amplitude_m: 0.1,
+        code: Code::Repetition,
         chip_rate: 2,
         patch_size: 480,
         tolerance_m: 0.75,
@@ -122,6 +124,7 @@ fn wrong_records_are_refused() {
         ("/message", json!("0")),
         ("/message", json!("xy")),
         ("/message", Value::Null),
+        ("/code", Value::Null),
         ("/layers", json!([])),
         ("/layers", json!([""])),
         ("/srs", json!("")),
@@ -149,6 +152,10 @@ fn the_ranges_are_those_of_the_options() {
             let pointer = format!("{object}/{}{unit}", option.name.to_lowercase());
             let (legal, illegal) = match option.kind {
                 Kind::Text => continue,
+                Kind::Choice(words) => {
+                    let [one, two] = words else { panic!("{} has two words", option.name) };
+                    ([json!(one.to_lowercase()), json!(two.to_lowercase())], [json!(one), json!("morse")])
+                }
                 Kind::Number(above, most) => {
                     ([json!(above + 1e-9), json!(most)], [json!(above), json!(most * 1.01)])
                 }
@@ -232,7 +239,7 @@ fn equal_input_makes_equal_decoys() {
 #[test]
 fn wrong_reports_are_refused() {
     let report = report_and_warnings("marked map", &["--records", "vectors"]).0;
-    let objects = ["", "/registration", "/vertices", "/parameters", "/decoys", "/candidates"];
+    let objects = ["", "/code", "/registration", "/vertices", "/parameters", "/decoys", "/candidates"];
     assert_closed("report", &report, &objects);
     assert_closed("report", &report, &["/candidates/list/0"]);
     let changes = [
@@ -243,6 +250,9 @@ fn wrong_reports_are_refused() {
         ("/message", json!("ABCD")),
         ("/bits/0", Value::Null),
         ("/bit_errors", json!(-1)),
+        ("/code/channel_bit_errors", json!(1025)),
+        ("/code/parity_holds", json!("yes")),
+        ("/code/decoder", json!("guess")),
         ("/p_value_log10", json!(0.5)),
         ("/p_mark_log10", json!("-inf")),
         ("/p_any_message_log10", json!(1)),

@@ -110,7 +110,7 @@ impl Stages {
             patches: patches.as_slice().len(),
             read,
             cut,
-            solve: mean_solve(&patches, message.len() * parameters.chip_rate + 1)?,
+            solve: mean_solve(&patches, patches.carriers(message.len(), &parameters)? + 1)?,
             embed,
         })
     }
