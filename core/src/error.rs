@@ -8,6 +8,8 @@ pub enum Error {
     NotFinite { index: usize, x: f64, y: f64 },
     #[error("the coordinates span {span:e} units: more than the 1e30 a mesh can be built on")]
     TooWide { span: f64 },
+    #[error("the map has no vertices: give one with geometry")]
+    NoVertices,
     #[error(
         "the map has {vertices} distinct vertices, fewer than PATCH_SIZE={patch_size}: {}",
         patch_size_hint(*.vertices)

@@ -2,6 +2,9 @@
 
 use crate::{Error, Result};
 
+/// A message of fewer bits is shared by too many recipients to identify one.
+pub const LEAST_IDENTIFYING_BITS: usize = 20;
+
 /// A message: m bits, a multiple of four, most significant bit of the first hex digit first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {

@@ -26,6 +26,9 @@ impl Patches {
     /// # Errors
     /// [`Error::TooFewVertices`] and [`Error::Collinear`].
     pub fn new(table: &VertexTable, ground: &Ground, patch_size: usize) -> Result<Self> {
+        if table.is_empty() {
+            return Err(Error::NoVertices);
+        }
         if table.len() < patch_size {
             return Err(Error::TooFewVertices { vertices: table.len(), patch_size });
         }

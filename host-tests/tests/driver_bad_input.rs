@@ -209,7 +209,7 @@ fn a_raster_is_no_source() {
 fn a_table_without_geometry_has_too_few_vertices() {
     let host = Host::new();
     fs::write(host.path("table.csv"), "a,b\n1,2\n").unwrap();
-    refuses_map(&host, "table.csv", &[], &["0 distinct vertices"]);
+    refuses_map(&host, "table.csv", &[], &["has no vertices"]);
 }
 
 #[test]
@@ -287,6 +287,32 @@ fn a_record_needs_a_folder_that_can_be_written() {
         &["-oo", "RECORD=/proc/acme.json"],
         &["RECORD=/proc/acme.json", "cannot be written"],
     );
+}
+
+#[test]
+fn a_record_is_not_lost_in_a_link_to_nowhere() {
+    let host = Host::new();
+    std::os::unix::fs::symlink("nowhere.json", host.path("link.json")).unwrap();
+    refuses_map(&host, &map(), &["-oo", "RECORD=link.json"], &["RECORD=link.json", "does not exist"]);
+}
+
+#[test]
+fn a_folder_of_shapefiles_is_not_written_into_itself() {
+    let host = Host::new();
+    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "shp", fixture("kotka.gpkg").to_str().unwrap()]).succeeds();
+    let files = || {
+        let entries = fs::read_dir(host.path("shp")).unwrap().map(|entry| entry.unwrap().path());
+        let mut files: Vec<_> = entries.map(|path| (path.clone(), fs::read(path).unwrap())).collect();
+        files.sort();
+        files
+    };
+    let before = files();
+    for source in ["shp", "shp/buildings.shp"] {
+        let run = host.mark("ESRI Shapefile", "shp", source, &[]);
+        assert_eq!(run.code, Some(1), "{}", run.stderr);
+        assert!(run.stderr.contains("the output shp is the source itself"), "{}", run.stderr);
+        assert!(files() == before, "{source}");
+    }
 }
 
 #[test]

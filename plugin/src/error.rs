@@ -31,6 +31,10 @@ pub enum Error {
     UnknownVertex { layer: String, fid: i64, x: f64, y: f64 },
     #[error("layer \"{layer}\", feature {fid}: {reason}")]
     Geometry { layer: String, fid: i64, reason: String },
+    #[error("the output {path} is the source itself: write the marked map to another place")]
+    OutputIsSource { path: String },
+    #[error("the value of option {0} is not UTF-8, so two names could become one: write it in UTF-8")]
+    NotUtf8(String),
     #[error("option \"{0}\" is not NAME=VALUE")]
     NotAnOption(String),
     #[error(

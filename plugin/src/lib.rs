@@ -18,5 +18,6 @@ mod ffi;
 mod ffi_errors;
 mod ffi_source;
 mod marking;
+mod output;
 mod record_file;
 mod source_files;

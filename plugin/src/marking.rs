@@ -2,13 +2,14 @@
 
 use crate::{
     error::{Error, Result},
-    record_file,
+    output, record_file,
     source_files::{SourceFiles, same_file},
 };
 use gdal::Dataset;
 use meshmark_core::{
     embedding::{self, Marked},
     key::SecretKey,
+    message::LEAST_IDENTIFYING_BITS,
     options::{Options, Subject},
     record::{self, Record, Reference},
     vertices::VertexTable,
@@ -40,6 +41,10 @@ impl Request {
         let pairs: Vec<(String, String)> = pairs.iter().map(split).collect::<Result<_>>()?;
         let ours =
             pairs.iter().filter(|(name, _)| !HINTS_OF_GDAL.iter().any(|h| h.eq_ignore_ascii_case(name)));
+        // Bytes that are no text have become this character on their way here.
+        if let Some((name, _)) = pairs.iter().find(|(_, value)| value.contains(char::REPLACEMENT_CHARACTER)) {
+            return Err(Error::NotUtf8(name.clone()));
+        }
         let options = Options::parse(ours.map(|(name, value)| (name.as_str(), value.as_str())))?;
         let subject = options.subject.clone().ok_or(Error::NoSubject)?;
         let key_path = options.key_path.clone().or(default_key_path).ok_or(Error::NoKey)?;
@@ -91,6 +96,7 @@ impl Marking {
     pub fn new(request: &Request, source: Source, threads: usize) -> Result<Self> {
         let options = &request.options;
         check_record_is_no_source(options, &source.files)?;
+        output::check_is_not_source(&source.files)?;
         let map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
         let ground = map.ground()?;
@@ -103,12 +109,19 @@ impl Marking {
         if let Some(path) = &options.record_path {
             record_file::write(Path::new(path), &record(request, &map, &marked).to_json())?;
         }
-        let warnings = match map.crs {
-            Some(_) => Vec::new(),
-            None => vec![
-                "the source has no CRS: its units are taken as metres; say SRS=... if they are not".into(),
-            ],
-        };
+        let mut warnings = Vec::new();
+        if map.crs.is_none() {
+            let text = "the source has no CRS: its units are taken as metres; say SRS=... if they are not";
+            warnings.push(text.into());
+        }
+        if message.len() < LEAST_IDENTIFYING_BITS {
+            warnings.push(format!(
+                "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
+                 hexadecimal digits or more",
+                message.len(),
+                LEAST_IDENTIFYING_BITS / 4
+            ));
+        }
         Ok(Marking {
             name: source.name,
             table: map.vertices,

@@ -35,7 +35,10 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
     file.as_file().sync_all().map_err(unwritable)?;
     match file.persist_noclobber(path) {
         Ok(_) => Ok(()),
-        Err(failed) if failed.error.kind() == ErrorKind::AlreadyExists => is_same(path, text).map(|_| ()),
+        Err(failed) if failed.error.kind() == ErrorKind::AlreadyExists => match is_same(path, text)? {
+            true => Ok(()),
+            false => Err(unwritable(io::Error::other("it is a link to a file that does not exist"))),
+        },
         Err(failed) => Err(unwritable(failed.error)),
     }
 }

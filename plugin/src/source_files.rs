@@ -77,6 +77,13 @@ impl SourceFiles {
         FileId::of(path).is_some_and(|id| self.files.iter().any(|file| file.state.id == id))
     }
 
+    /// Whether `path` is one of the files, or the folder of a dataset of several files.
+    pub fn contain_or_lie_in(&self, path: &Path) -> bool {
+        let several = self.files.len() > 1;
+        let is_folder = |id| self.files.iter().any(|f| f.path.parent().and_then(FileId::of) == Some(id));
+        self.contain(path) || several && FileId::of(path).is_some_and(is_folder)
+    }
+
     /// Fails when a file is not what it was, or when a transaction on it is under way.
     pub fn check(&self) -> Result<()> {
         let Some(file) = self.files.iter().find(|file| !file.is_unchanged()) else { return Ok(()) };

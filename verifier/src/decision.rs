@@ -9,11 +9,12 @@
 //! messages the tail is that of the normal distribution (tests of core's `code.rs`). The larger p counts.
 
 use crate::survival;
-use meshmark_core::{demodulation::Demodulation, message::Message};
+use meshmark_core::{
+    demodulation::Demodulation,
+    message::{LEAST_IDENTIFYING_BITS, Message},
+};
 use serde::Serialize;
 
-/// A message of fewer bits is shared by too many recipients.
-pub const LEAST_BITS: usize = 20;
 /// A suspect may be called unmarked when a mark would show this many standard deviations above what
 /// significance needs.
 const POWER_MARGIN: f64 = 3.0;
@@ -77,9 +78,10 @@ pub fn decide_among(found: &Demodulation, message: &Message, tried: usize, signi
     // A message of m bits cannot be hit less often than once in 2^m.
     let p_recipient =
         survival::normal_log10(found.recipient_score(message)).max(-(bits as f64) * 2f64.log10());
-    let (verdict, reason) = if bits < LEAST_BITS {
-        let reason =
-            format!("a message of {bits} bits cannot identify anyone: mark with {LEAST_BITS} or more");
+    let (verdict, reason) = if bits < LEAST_IDENTIFYING_BITS {
+        let reason = format!(
+            "a message of {bits} bits cannot identify anyone: mark with {LEAST_IDENTIFYING_BITS} or more"
+        );
         (Verdict::Inconclusive, reason)
     } else if p_mark.max(p_recipient) < significance.log10() {
         (Verdict::Match, "the evidence for this key and this message is below the significance".into())

@@ -6,6 +6,7 @@ use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
 use std::{
     collections::BTreeSet,
+    io::Read,
     path::{Path, PathBuf},
     sync::Mutex,
 };
@@ -27,6 +28,9 @@ const SUSPECT_DRIVERS: &[&str] = &[
     "SQLite",
     "TopoJSON",
 ];
+
+/// Keys and records are a few hundred bytes; a mistaken /dev/zero has no end.
+const LONGEST_TEXT: u64 = 1 << 20;
 
 /// GDAL's last error message, kept instead of printed.
 static LAST_FAILURE: Mutex<Option<String>> = Mutex::new(None);
@@ -57,8 +61,16 @@ pub fn record(path: &Path) -> Result<Record> {
 }
 
 fn text(what: &str, path: &Path) -> Result<String> {
-    std::fs::read_to_string(path)
-        .map_err(|error| Error::Usage(format!("the {what} {} cannot be read: {error}", path.display())))
+    let unreadable =
+        |reason: String| Error::Usage(format!("the {what} {} cannot be read: {reason}", path.display()));
+    let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
+    let mut text = String::new();
+    let mut longest = file.take(LONGEST_TEXT + 1);
+    longest.read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
+    match text.len() as u64 {
+        0..=LONGEST_TEXT => Ok(text),
+        _ => Err(unreadable(format!("it is longer than the {LONGEST_TEXT} bytes of any key or record"))),
+    }
 }
 
 /// How to read a map.

@@ -1,0 +1,55 @@
+//! What ogr2ogr was told to write to, read from its command line.
+//!
+//! Writers of several files, like that of Shapefiles, append to the files of a folder without asking the
+//! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the
+//! source itself, so this is refused before anything is written. Other hosts are not looked at.
+
+use crate::{
+    error::{Error, Result},
+    source_files::SourceFiles,
+};
+use std::path::Path;
+
+/// Options of ogr2ogr that name another input.
+const INPUT_OPTIONS: [&str; 2] = ["-clipsrc", "-clipdst"];
+
+/// Fails when this process is an ogr2ogr whose target is the source, or the folder of its files.
+pub fn check_is_not_source(files: &SourceFiles) -> Result<()> {
+    let arguments: Vec<String> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    match target_in_source(&arguments, |path| files.contain_or_lie_in(path)) {
+        Some(path) => Err(Error::OutputIsSource { path: path.into() }),
+        None => Ok(()),
+    }
+}
+
+/// The target stands before the source; between and before them stand options and their values.
+fn target_in_source<'a>(arguments: &'a [String], is_source: impl Fn(&Path) -> bool) -> Option<&'a str> {
+    let (program, rest) = arguments.split_first()?;
+    if Path::new(program).file_name()? != "ogr2ogr" {
+        return None;
+    }
+    let source = rest.iter().position(|a| a.get(..9).is_some_and(|p| p.eq_ignore_ascii_case("MESHMARK:")))?;
+    let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
+    let named = (0..source).find(|&at| !is_input(at) && is_source(Path::new(&rest[at])))?;
+    Some(&rest[named])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(line: &str) -> bool {
+        let arguments: Vec<String> = line.split(' ').map(String::from).collect();
+        target_in_source(&arguments, |path| path == Path::new("map")).is_some()
+    }
+
+    #[test]
+    fn only_a_target_of_ogr2ogr_that_is_the_source_is_refused() {
+        assert!(refused("/usr/bin/ogr2ogr map MESHMARK:map -oo KEY=k"));
+        assert!(refused("ogr2ogr -append map -oo KEY=k meshmark:map/roads.shp"));
+        assert!(!refused("ogr2ogr out MESHMARK:map map"), "a layer of that name");
+        assert!(!refused("ogr2ogr -clipsrc map out MESHMARK:map"), "another input");
+        assert!(!refused("python3 map MESHMARK:map"), "another program");
+        assert!(!refused("ogr2ogr out map"), "without us");
+    }
+}
