@@ -352,7 +352,7 @@ fn the_source_survives_being_named_as_the_output() {
         for mode in [&[][..], &["-overwrite"], &["-append"], &["-update"]] {
             let (host, expected) = (Host::new(), Host::new());
             let said = write_onto_source(&host, format, name, mode, name);
-            assert!(said.contains("cannot be written at the same time"), "{format} {mode:?}: {said}");
+            assert!(said.contains("is the source itself"), "{format} {mode:?}: {said}");
             expected.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]).succeeds();
             assert_same_files(&host, &expected, format);
         }
@@ -403,7 +403,12 @@ fn a_writer_that_truncates_the_source_all_the_same_leaves_a_saved_copy() {
         let host = Host::new();
         host.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]);
         let original = fs::read(host.path(name)).unwrap();
-        let run = host.mark(format, name, name, &[]);
+        // The driver reads the command line of ogr2ogr alone; this is any other program that writes.
+        fs::copy("/usr/bin/ogr2ogr", host.path("export")).unwrap();
+        let source = format!("MESHMARK:{name}");
+        let options = ["-oo", "KEY=key.json", "-oo", "RECIPIENT=B"];
+        let arguments = [&["-f", format, name, &source][..], &options].concat();
+        let run = host.run(host.path("export").to_str().unwrap(), &arguments);
         assert_ne!(run.code, Some(0), "{format}");
         assert!(run.stderr.contains(&format!("{name}.saved")), "{format}: {}", run.stderr);
         assert!(fs::read(host.path(&format!("{name}.saved"))).unwrap() == original, "{format}");
