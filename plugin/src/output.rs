@@ -23,7 +23,7 @@ pub fn check_is_not_source(files: &SourceFiles) -> Result<()> {
 }
 
 /// The target stands before the source; between and before them stand options and their values.
-fn target_in_source<'a>(arguments: &'a [String], is_source: impl Fn(&Path) -> bool) -> Option<&'a str> {
+fn target_in_source(arguments: &[String], is_source: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
     if Path::new(program).file_name()? != "ogr2ogr" {
         return None;
