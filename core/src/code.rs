@@ -18,9 +18,9 @@ const N: usize = 256;
 const K: usize = 128;
 /// Belief propagation converges within a few dozen rounds or never.
 const MOST_ROUNDS: usize = 100;
-/// How many bits of the most reliable basis may be wrong. In ten thousands of trials with noise, order 3 takes
-/// 40 times as long and reads a few per cent more messages.
-const ORDER: usize = 2;
+/// How many bits of the most reliable basis may be wrong. Where repetition of the same displacement has 4.8 % wrong
+/// bits, 46 % of the messages are read by belief propagation, 68 % with order 2 and 81 % with order 3.
+const ORDER: usize = 3;
 
 /// A code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,9 +49,9 @@ pub enum Decoder {
 pub struct Decoded {
     /// The most likely message that was found.
     pub message: Message,
-    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1. With LDPC, how much more likely the best
-    /// code word with this bit is than the best one without it, of those that were looked at; so the smallest
-    /// of them is the margin of the message before the next best.
+    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1. With LDPC from the best code word with
+    /// this bit and the best one without it, and from how many code words that were not looked at may be
+    /// as near: the smallest of them says how far to trust the message.
     pub message_llrs: Vec<f64>,
     /// Whether belief propagation came to a word that passes all parity checks, which noise alone next to never
     /// does; `None` for repetition, which has none.
@@ -135,12 +135,28 @@ fn decode_ldpc(llrs: &[f64]) -> Decoded {
     let (_, best) = search.best;
     let decoder =
         if converged == Some(best) { Decoder::BeliefPropagation } else { Decoder::OrderedStatistics };
+    // Either value is as frequent among what was not looked at.
+    let unseen = log_likelihood_of_unseen(llrs) - 2f64.ln();
+    let likelihood = |value: usize, j: usize| log_sum(-search.least[value][j], unseen);
     Decoded {
         message: Message::from_signs(&best.signs()[..K]),
-        message_llrs: (0..K).map(|j| search.least[0][j] - search.least[1][j]).collect(),
+        message_llrs: (0..K).map(|j| likelihood(1, j) - likelihood(0, j)).collect(),
         parity_holds: Some(converged.is_some()),
         decoder,
     }
+}
+
+/// ln of the likelihoods of all code words together, had they been drawn at random, on the scale where a word of
+/// distance w has e⁻ʷ (J. Feng, K. Duffy, M. Médard, *Leveraging code structure to improve soft output for GRAND,
+/// GCD, OSD, and SCL*, arXiv 2503.16677, 2025). The near ones that were looked at count twice: to be on the safe side.
+fn log_likelihood_of_unseen(llrs: &[f64]) -> f64 {
+    let mean = |llr: &f64| (-llr.abs()).exp().ln_1p() - 2f64.ln();
+    K as f64 * 2f64.ln() + llrs.iter().map(mean).sum::<f64>()
+}
+
+/// ln(eᵃ + eᵇ).
+fn log_sum(a: f64, b: f64) -> f64 {
+    a.max(b) + (-(a - b).abs()).exp().ln_1p()
 }
 
 /// The word that belief propagation comes to, if it passes all parity checks.
@@ -158,6 +174,8 @@ fn believe(llrs: &[f64]) -> Option<Word> {
 struct Search {
     /// A basis of the code: row i alone has a 1 at the i-th of the K most reliable independent places.
     rows: Vec<Word>,
+    /// |llr| at those places, descending.
+    costs: Vec<f64>,
     /// What was received, bit by bit.
     received: Word,
     /// The code word that agrees with it at all of those places.
@@ -201,6 +219,7 @@ impl Search {
         };
         Search {
             rows,
+            costs: basis.iter().map(|&place| llrs[place].abs()).collect(),
             received,
             start,
             weights: (0..N / 8).map(weight).collect(),
@@ -216,14 +235,20 @@ impl Search {
         if let Some(word) = more {
             self.look_at(*word);
         }
-        self.around(self.start, 0, order);
+        self.around(self.start, 0.0, K, order);
     }
 
-    fn around(&mut self, word: Word, first: usize, flips: usize) {
-        for row in if flips == 0 { K..K } else { first..K } {
+    /// Flips up to `flips` of the first `end` places of the basis, from the least reliable on. A word is at least as
+    /// far as its flipped places cost, so what is too far already is left out without loss.
+    fn around(&mut self, word: Word, cost: f64, end: usize, flips: usize) {
+        for row in (0..if flips == 0 { 0 } else { end }).rev() {
+            let cost = cost + self.costs[row];
+            if cost >= self.relevant {
+                break;
+            }
             let word = word ^ self.rows[row];
             self.look_at(word);
-            self.around(word, row + 1, flips - 1);
+            self.around(word, cost, row, flips - 1);
         }
     }
 
@@ -378,29 +403,30 @@ mod tests {
     }
 
     #[test]
-    fn the_margin_says_how_far_to_trust_the_message() {
+    fn bits_are_less_often_wrong_than_they_say() {
         let mut random = Random::new(4);
-        let margin = |decoded: &Decoded| decoded.message_llrs.iter().fold(f64::MAX, |m, l| l.abs().min(m));
-        let (mut right, mut wrong) = (Vec::new(), Vec::new());
-        for _ in 0..400 {
+        let (mut wrong, mut expected, mut sure) = (0.0, 0.0, 0);
+        for _ in 0..200 {
             let message = random.message();
             let decoded = Code::Ldpc.decode(&random.received(&Code::Ldpc.encode(&message), 0.9));
-            assert_eq!(Message::from_signs(&decoded.message_llrs), decoded.message);
-            if decoded.message == message { &mut right } else { &mut wrong }.push(margin(&decoded));
+            wrong += decoded.message.errors(&message) as f64;
+            expected += decoded.message_llrs.iter().map(|llr| 1.0 / (1.0 + llr.abs().exp())).sum::<f64>();
+            let agrees = |(llr, sign): (&f64, &f64)| llr * sign >= 0.0;
+            assert!(decoded.message_llrs.iter().zip(&decoded.message.signs()).all(agrees));
+            if decoded.message_llrs.iter().all(|llr| llr.abs() > 1000f64.ln()) {
+                assert_eq!(decoded.message, message);
+                sure += 1;
+            }
         }
-        let median = |margins: &mut Vec<f64>| {
-            margins.sort_by(f64::total_cmp);
-            margins[margins.len() / 2]
-        };
-        let (right, wrong) = (median(&mut right), median(&mut wrong));
-        assert!(right > 3.0 * wrong, "{right} {wrong}");
+        assert!((0.25..1.0).contains(&(wrong / expected)), "{wrong} wrong bits, {expected} expected");
+        assert!(sure > 40, "{sure} of 200 messages are sure");
     }
 
     #[test]
     fn nothing_received_passes_no_parity_check() {
         let decoded = Code::Ldpc.decode(&[0.0; N]);
         assert_eq!(decoded.parity_holds, Some(false));
-        assert!(decoded.message_llrs.iter().all(|llr| *llr == 0.0));
+        assert!(decoded.message_llrs.iter().all(|llr| llr.abs() < 1e-9));
     }
 
     /// The columns of the generator: bit i of a random code word is the product of the message with column i.
