@@ -1,6 +1,7 @@
 //! The vertices of a map in canonical order: the one numbering that embedding and detection share.
 
 use crate::{Error, Result};
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 /// Distinct vertices, sorted by x and then y, so that nothing depends on the order of features in
@@ -15,14 +16,29 @@ impl VertexTable {
     ///
     /// # Errors
     /// [`Error::NotFinite`] for NaN or infinite coordinates, [`Error::TooWide`] past 1e30 units.
-    pub fn new(mut coords: Vec<[f64; 2]>) -> Result<Self> {
+    pub fn new(coords: Vec<[f64; 2]>) -> Result<Self> {
+        Ok(Self::indexed(coords)?.0)
+    }
+
+    /// The same, and for every one of `coords` the canonical index of its vertex.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn indexed(coords: Vec<[f64; 2]>) -> Result<(Self, Vec<u32>)> {
         if let Some(index) = coords.iter().position(|p| !p[0].is_finite() || !p[1].is_finite()) {
             let [x, y] = coords[index];
             return Err(Error::NotFinite { index, x, y });
         }
-        coords.iter_mut().for_each(|p| *p = canonical(*p));
-        coords.sort_unstable_by(order);
-        coords.dedup();
+        let mut sorted: Vec<([f64; 2], u32)> = coords.into_iter().map(canonical).zip(0..).collect();
+        sorted.par_sort_unstable_by(|a, b| order(&a.0, &b.0));
+        let mut indices = vec![0; sorted.len()];
+        let mut coords: Vec<[f64; 2]> = Vec::new();
+        for (point, place) in sorted {
+            if coords.last() != Some(&point) {
+                coords.push(point);
+            }
+            indices[place as usize] = coords.len() as u32 - 1;
+        }
         coords.shrink_to_fit();
         let table = VertexTable { coords };
         let (min, max) = table.bounds();
@@ -30,7 +46,7 @@ impl VertexTable {
         if span > 1e30 {
             return Err(Error::TooWide { span });
         }
-        Ok(table)
+        Ok((table, indices))
     }
 
     /// The vertices in canonical order, CRS units.
@@ -104,6 +120,14 @@ mod tests {
         assert_eq!(table.coords(), [[0.0, 0.0], [1.0, 2.0]]);
         assert_eq!(table.index_of([-0.0, 0.0]), Some(0));
         assert_eq!(table.index_of([1.0, 2.5]), None);
+    }
+
+    #[test]
+    fn every_occurrence_knows_its_vertex() {
+        let coords = vec![[1.0, 2.0], [0.0, -0.0], [-0.0, 0.0], [1.0, 2.0], [1.0, -3.0]];
+        let (table, indices) = VertexTable::indexed(coords.clone()).unwrap();
+        assert_eq!(indices, [2, 0, 0, 2, 1]);
+        assert!(coords.iter().zip(&indices).all(|(p, &i)| table.index_of(*p) == Some(i as usize)));
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
-use crate::{CoordinateSystem, Error, Label, Result, Shape, crs, labels, parse_srs, shapes, wkb};
+use crate::{
+    CoordinateSystem, Error, Label, Result, Shape, crs, labels, parse_srs, shapes,
+    wkb::{self, Step},
+};
 use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
@@ -62,6 +65,8 @@ pub struct Selection<'a> {
 pub struct Survey {
     /// Its distinct vertices.
     pub vertices: VertexTable,
+    /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
+    pub segments: Vec<[u32; 2]>,
     /// Its CRS: the common one of its layers, or the one it was reprojected into.
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and could be in degrees.
@@ -89,7 +94,8 @@ impl Survey {
 /// that are not finite, a CRS in which metres mean nothing.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let names = layer_names(dataset, selection.layers)?;
-    let mut walk = Walk { selection, crs: None, coords: Vec::new(), labels: Vec::new(), shapes: Vec::new() };
+    let mut walk =
+        Walk { selection, crs: None, chains: Chains::default(), labels: Vec::new(), shapes: Vec::new() };
     for name in &names {
         walk.layer(&mut dataset.layer_by_name(name)?, name)?;
     }
@@ -97,13 +103,14 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Target::Crs(target) => Some(target.clone()),
         Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
-    let vertices = VertexTable::new(walk.coords)?;
+    let (vertices, indices) = VertexTable::indexed(walk.chains.coords)?;
+    let segments = segments(&indices, &walk.chains.starts);
     let ground = match crs::ground(crs.as_ref(), &vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
-    Ok(Survey { vertices, crs, ground, labels: walk.labels, shapes: walk.shapes })
+    Ok(Survey { vertices, segments, crs, ground, labels: walk.labels, shapes: walk.shapes })
 }
 
 /// The names of the chosen layers, in the dataset's order.
@@ -119,11 +126,49 @@ fn layer_names(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<Strin
     }
 }
 
+/// Coordinates of rings, lines and points, one after the other.
+#[derive(Clone, Default)]
+struct Chains {
+    coords: Vec<[f64; 2]>,
+    /// Where in `coords` each of them starts, ascending.
+    starts: Vec<u32>,
+}
+
+impl Chains {
+    fn push(&mut self, step: Step, point: [f64; 2]) {
+        if step == Step::First {
+            self.starts.push(self.coords.len() as u32);
+        }
+        self.coords.push(point);
+    }
+
+    fn append(&mut self, other: &mut Chains) {
+        let offset = self.coords.len() as u32;
+        self.starts.extend(other.starts.drain(..).map(|start| start + offset));
+        self.coords.append(&mut other.coords);
+    }
+}
+
+/// Pairs of consecutive vertices: `indices` of every coordinate, `starts` of the chains among them.
+fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
+    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
+    let chains = starts.iter().zip(ends).map(|(&start, end)| &indices[start as usize..end]);
+    let mut segments: Vec<[u32; 2]> = chains
+        .flat_map(|chain| chain.windows(2))
+        .filter(|pair| pair[0] != pair[1])
+        .map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])])
+        .collect();
+    segments.sort_unstable();
+    segments.dedup();
+    segments.shrink_to_fit();
+    segments
+}
+
 struct Walk<'a> {
     selection: &'a Selection<'a>,
     /// The first layer with vertices, and its CRS.
     crs: Option<(String, Option<CoordinateSystem>)>,
-    coords: Vec<[f64; 2]>,
+    chains: Chains,
     labels: Vec<Label>,
     shapes: Vec<Shape>,
 }
@@ -132,12 +177,13 @@ impl Walk<'_> {
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<()> {
         let columns = self.columns(layer)?;
         let (first_label, first_shape) = (self.labels.len(), self.shapes.len());
-        let mut of_column: Vec<Vec<[f64; 2]>> = vec![Vec::new(); columns.len()];
+        let mut of_column = vec![Chains::default(); columns.len()];
         for feature in layer.features() {
-            for (column, coords) in of_column.iter_mut().enumerate() {
-                read_geometry(&feature, column, name, coords)?;
+            for (column, chains) in of_column.iter_mut().enumerate() {
+                read_geometry(&feature, column, name, chains)?;
             }
-            let vertices = self.coords.len() + of_column.iter().map(Vec::len).sum::<usize>();
+            let vertices =
+                self.chains.coords.len() + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
             if vertices > self.selection.most_vertices {
                 return Err(Error::TooLarge { most: self.selection.most_vertices });
             }
@@ -146,13 +192,13 @@ impl Walk<'_> {
         if let Some(reason) = (self.selection.last_failure)() {
             return Err(Error::Unreadable { layer: name.into(), reason });
         }
-        for (crs, coords) in columns.iter().zip(&mut of_column) {
+        for (crs, chains) in columns.iter().zip(&mut of_column) {
             match self.selection.target {
-                Target::Crs(target) => reproject(coords, crs.as_ref(), target, name)?,
-                Target::Own if !coords.is_empty() => self.check_crs(name, crs)?,
+                Target::Crs(target) => reproject(&mut chains.coords, crs.as_ref(), target, name)?,
+                Target::Own if !chains.coords.is_empty() => self.check_crs(name, crs)?,
                 Target::Own | Target::Raw => {}
             }
-            self.coords.append(coords);
+            self.chains.append(chains);
         }
         if let (Target::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
             let labels = &mut self.labels[first_label..];
@@ -220,19 +266,21 @@ impl Walk<'_> {
 }
 
 /// Appends the coordinates of one geometry of a feature.
-fn read_geometry(feature: &Feature, column: usize, layer: &str, coords: &mut Vec<[f64; 2]>) -> Result<()> {
+fn read_geometry(feature: &Feature, column: usize, layer: &str, chains: &mut Chains) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
     let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
-    let mut visit = |[x, y]: [f64; 2]| {
+    let mut visit = |step, [x, y]: [f64; 2]| {
         if !x.is_finite() || !y.is_finite() {
             return Err(Error::NotFinite { layer: layer.into(), fid: fid(), x, y });
         }
-        coords.push([x, y]);
+        chains.push(step, [x, y]);
         Ok([x, y])
     };
     let failed = |reason: String| Error::Geometry { layer: layer.into(), fid: fid(), reason };
     let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
-    match wkb::map_coordinates::<Visit>(&mut bytes, &mut |point| visit(point).map_err(Visit::Ours)) {
+    match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
+        visit(step, point).map_err(Visit::Ours)
+    }) {
         Ok(()) => Ok(()),
         Err(Visit::Ours(error)) => Err(error),
         Err(Visit::Wkb(error)) => Err(failed(error.to_string())),
@@ -267,4 +315,17 @@ fn reproject(
     transform.transform_coords(&mut x, &mut y, &mut []).map_err(failed)?;
     coords.iter_mut().zip(x.into_iter().zip(y)).for_each(|(p, (x, y))| *p = [x, y]);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn segments_join_neighbours_of_a_chain_once_and_no_vertex_with_itself() {
+        // A triangle 0 1 2 0, a line 2 1 1 3 along one of its sides, a point 4.
+        let indices = [0, 1, 2, 0, 2, 1, 1, 3, 4];
+        assert_eq!(segments(&indices, &[0, 4, 8]), [[0, 1], [0, 2], [1, 2], [1, 3]]);
+        assert_eq!(segments(&[], &[]), Vec::<[u32; 2]>::new());
+    }
 }

@@ -15,6 +15,15 @@ pub enum WkbError {
 
 const MOST_NESTED: usize = 64;
 
+/// Whether a coordinate pair begins a sequence (ring, line, point) or is joined to the one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// The first pair of a sequence.
+    First,
+    /// A segment leads here from the pair before. Arcs count as the chords of their control points.
+    Next,
+}
+
 /// Calls `f` with every coordinate pair of a geometry and writes back what it returns. An empty point
 /// (NaN NaN) has none.
 ///
@@ -22,7 +31,7 @@ const MOST_NESTED: usize = 64;
 /// [`WkbError`] for bytes that are not a geometry, `f`'s own error when it fails.
 pub fn map_coordinates<E: From<WkbError>>(
     wkb: &mut [u8],
-    f: &mut impl FnMut([f64; 2]) -> Result<[f64; 2], E>,
+    f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
 ) -> Result<(), E> {
     Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
 }
@@ -41,7 +50,7 @@ struct Layout {
 impl Cursor<'_> {
     fn geometry<E: From<WkbError>>(
         &mut self,
-        f: &mut impl FnMut([f64; 2]) -> Result<[f64; 2], E>,
+        f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
         depth: usize,
     ) -> Result<(), E> {
         if depth > MOST_NESTED {
@@ -55,7 +64,7 @@ impl Cursor<'_> {
         }
         let layout = Layout { little_endian, ordinates };
         match kind {
-            1 => self.point(&layout, f, true),
+            1 => self.point(&layout, f, Step::First, true),
             2 | 8 => self.sequence(&layout, f), // LineString, CircularString
             3 | 17 => {
                 // Polygon, Triangle
@@ -78,10 +87,11 @@ impl Cursor<'_> {
     fn sequence<E: From<WkbError>>(
         &mut self,
         layout: &Layout,
-        f: &mut impl FnMut([f64; 2]) -> Result<[f64; 2], E>,
+        f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
     ) -> Result<(), E> {
-        for _ in 0..self.count(layout.little_endian)? {
-            self.point(layout, f, false)?;
+        for place in 0..self.count(layout.little_endian)? {
+            let step = if place == 0 { Step::First } else { Step::Next };
+            self.point(layout, f, step, false)?;
         }
         Ok(())
     }
@@ -89,7 +99,8 @@ impl Cursor<'_> {
     fn point<E: From<WkbError>>(
         &mut self,
         layout: &Layout,
-        f: &mut impl FnMut([f64; 2]) -> Result<[f64; 2], E>,
+        f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
+        step: Step,
         may_be_empty: bool,
     ) -> Result<(), E> {
         let start = self.at;
@@ -101,7 +112,7 @@ impl Cursor<'_> {
         if may_be_empty && x.is_nan() && y.is_nan() {
             return Ok(());
         }
-        for (axis, value) in f([x, y])?.into_iter().enumerate() {
+        for (axis, value) in f(step, [x, y])?.into_iter().enumerate() {
             let at = start + 8 * axis;
             self.bytes[at..at + 8].copy_from_slice(&layout.encode(value));
         }
@@ -150,7 +161,7 @@ mod tests {
     fn shifted(wkt: &str) -> (String, usize) {
         let mut wkb = Geometry::from_wkt(wkt).unwrap().iso_wkb().unwrap();
         let mut seen = 0;
-        map_coordinates::<WkbError>(&mut wkb, &mut |[x, y]| {
+        map_coordinates::<WkbError>(&mut wkb, &mut |_, [x, y]| {
             seen += 1;
             Ok([x + 100.0, y + 1000.0])
         })
@@ -200,14 +211,14 @@ mod tests {
         let wkb = Geometry::from_wkt("LINESTRING (1 2,3 4)").unwrap().iso_wkb().unwrap();
         for end in 0..wkb.len() {
             let mut cut = wkb[..end].to_vec();
-            let result = map_coordinates::<WkbError>(&mut cut, &mut |p| Ok(p));
+            let result = map_coordinates::<WkbError>(&mut cut, &mut |_, p| Ok(p));
             assert_eq!(result, Err(WkbError::Truncated), "{end} bytes");
         }
         let mut unknown = vec![1, 99, 0, 0, 0];
-        let result = map_coordinates::<WkbError>(&mut unknown, &mut |p| Ok(p));
+        let result = map_coordinates::<WkbError>(&mut unknown, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::UnknownType(99)));
         let mut nested: Vec<u8> = [1, 7, 0, 0, 0, 1, 0, 0, 0].repeat(1000);
-        let result = map_coordinates::<WkbError>(&mut nested, &mut |p| Ok(p));
+        let result = map_coordinates::<WkbError>(&mut nested, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::TooDeep));
     }
 }

@@ -63,7 +63,7 @@ impl LayerContents {
 /// The coordinates of a geometry.
 pub fn coords(wkb: &[u8]) -> Vec<[f64; 2]> {
     let mut coords = Vec::new();
-    let mut keep = |point| {
+    let mut keep = |_, point| {
         coords.push(point);
         Ok(point)
     };
@@ -74,7 +74,7 @@ pub fn coords(wkb: &[u8]) -> Vec<[f64; 2]> {
 /// A geometry's bytes with every coordinate pair zeroed: type, structure, Z and M.
 fn skeleton(wkb: &[u8]) -> Vec<u8> {
     let mut bytes = wkb.to_vec();
-    wkb::map_coordinates::<WkbError>(&mut bytes, &mut |_| Ok([0.0, 0.0])).unwrap();
+    wkb::map_coordinates::<WkbError>(&mut bytes, &mut |_, _| Ok([0.0, 0.0])).unwrap();
     bytes
 }
 

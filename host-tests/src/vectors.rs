@@ -70,7 +70,7 @@ pub fn coordinates(path: &Path) -> Vec<[f64; 2]> {
     for mut layer in dataset.layers() {
         for feature in layer.features() {
             let mut bytes = feature.geometry().expect("a geometry").iso_wkb().expect("WKB");
-            let mut push = |point| {
+            let mut push = |_, point| {
                 all.push(point);
                 Ok::<_, wkb::WkbError>(point)
             };

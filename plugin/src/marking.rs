@@ -140,7 +140,7 @@ impl Marking {
     /// Moves every coordinate of a WKB geometry; how many there are.
     pub fn move_geometry(&self, bytes: &mut [u8]) -> std::result::Result<usize, NotMoved> {
         let mut count = 0;
-        wkb::map_coordinates::<NotMoved>(bytes, &mut |point| {
+        wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
             count += 1;
             let index = self.table.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
             Ok(self.moved[index])
