@@ -10,6 +10,7 @@ pub mod decision;
 pub mod decoys;
 mod error;
 pub mod explain;
+mod joined;
 pub mod matching;
 pub mod progress;
 pub mod reading;

@@ -1,5 +1,6 @@
 //! Matching: which suspect vertex is which reference vertex (paper, section 3.5).
 
+use crate::joined::{self, Candidate, Graph};
 use meshmark_core::ground::Ground;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
@@ -63,12 +64,29 @@ impl<'a> Matcher<'a> {
 
     /// Matches every `step`-th reference vertex.
     pub fn every(&self, step: usize, suspect: &[[f64; 2]], radius_m: f64) -> Matches {
+        self.mutual(step, suspect, &self.tree_of(suspect), radius_m)
+    }
+
+    /// Matches every reference vertex, and where several suspect vertices are near chooses by what they are
+    /// joined to. `graphs`: of the reference and of the suspect.
+    pub fn joined(&self, suspect: &[[f64; 2]], radius_m: f64, graphs: [&Graph; 2]) -> Matches {
         let tree = self.tree_of(suspect);
+        let nearest = self.mutual(1, suspect, &tree, radius_m);
+        let near = |reference: u32| {
+            let within = self.within(&tree, self.reference[reference as usize], radius_m);
+            within.map(move |(distance_m, suspect)| Candidate { reference, suspect, distance_m })
+        };
+        let candidates: Vec<Candidate> =
+            (0..self.reference.len() as u32).into_par_iter().flat_map_iter(near).collect();
+        joined::choose(nearest, &candidates, graphs[0], graphs[1])
+    }
+
+    fn mutual(&self, step: usize, suspect: &[[f64; 2]], tree: &RTree<Node>, radius_m: f64) -> Matches {
         let mutual = |i: usize| {
             if !i.is_multiple_of(step) {
                 return None;
             }
-            let there = self.nearest(&tree, self.reference[i], radius_m)?;
+            let there = self.nearest(tree, self.reference[i], radius_m)?;
             let back = self.nearest(&self.tree, suspect[there as usize], radius_m)?;
             (back as usize == i).then_some(there)
         };
@@ -87,19 +105,22 @@ impl<'a> Matcher<'a> {
 
     /// The point of `tree` nearest to `from` on the ground, within `radius_m`; ties go to the smaller index.
     fn nearest(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> Option<u32> {
+        let within = self.within(tree, from, radius_m);
+        within.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, index)| index)
+    }
+
+    /// The points of `tree` within `radius_m` of `from` on the ground: distance in metres and index.
+    fn within(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> impl Iterator<Item = (f64, u32)> {
         let [mx, my] = self.ground.metres_per_unit(from);
         let scale = [mx / self.x_scale, my]; // metres per unit of the plane
         let reach = radius_m / scale[0].min(scale[1]);
         let at = self.plane(from);
-        let distance = |node: &Node| {
+        let distance = move |node: &Node| {
             let d = ((node.at[0] - at[0]) * scale[0]).hypot((node.at[1] - at[1]) * scale[1]);
             (d, node.index)
         };
-        let candidates = tree.locate_within_distance(at, reach * reach * (1.0 + 1e-12)).map(distance);
-        candidates
-            .filter(|(d, _)| *d <= radius_m)
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-            .map(|(_, index)| index)
+        let candidates = tree.locate_within_distance(at, reach * reach * (1.0 + 1e-12));
+        candidates.map(distance).filter(move |(d, _)| *d <= radius_m)
     }
 }
 

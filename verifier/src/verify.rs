@@ -4,6 +4,7 @@ use crate::{
     Error, Result,
     decision::{Decision, decide},
     decoys::Decoys,
+    joined::Graph,
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
@@ -162,7 +163,8 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         decoys: None,
     };
     if matches.count >= LEAST_MATCHED && matches.count >= 2 * chance {
-        let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches };
+        let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
+        let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
         let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress)?;
         seen.decoys = Decoys::new(&found, &suspect.vertices, &reference.vertices);
         seen.found = Ok(found);
@@ -187,7 +189,7 @@ fn demodulate(
     progress.start("deformation", 0);
     let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
     let carriers = patches.carriers(bits, parameters)?;
-    let (observed, disturbance) = tracking.follow(matches, carriers, request)?;
+    let (observed, disturbance) = tracking.follow(carriers, request)?;
     vertices.matched = observed.iter().flatten().count();
 
     progress.start("demodulation", patches.as_slice().len() as u64);
@@ -268,16 +270,14 @@ struct Tracking<'a> {
     moved: &'a [[f64; 2]],
     ground: &'a Ground,
     patches: &'a Patches,
+    /// Of the reference and of the suspect.
+    graphs: [Graph; 2],
 }
 
 impl Tracking<'_> {
-    fn follow(
-        &self,
-        matches: &Matches,
-        carriers: usize,
-        request: &Request,
-    ) -> Result<(Vec<Option<[f64; 2]>>, Prediction)> {
-        let mut observed = self.displacements(matches);
+    fn follow(&self, carriers: usize, request: &Request) -> Result<(Vec<Option<[f64; 2]>>, Prediction)> {
+        let coords = self.reference.vertices.coords();
+        let mut observed = self.displacements(&self.match_joined(coords, request.radius_m));
         let mut round = 1;
         loop {
             let deformation = Deformation::estimate(self.patches, &observed, carriers, &request.parameters)?;
@@ -298,7 +298,13 @@ impl Tracking<'_> {
         };
         let coords = self.reference.vertices.coords().iter();
         let expected: Vec<[f64; 2]> = coords.zip(&prediction.displacement_m).map(shifted).collect();
-        Matcher::new(&expected, self.ground, self.reference.vertices.centre()).all(self.moved, radius_m)
+        self.match_joined(&expected, radius_m)
+    }
+
+    /// `expected`: where the reference vertices should be found.
+    fn match_joined(&self, expected: &[[f64; 2]], radius_m: f64) -> Matches {
+        let matcher = Matcher::new(expected, self.ground, self.reference.vertices.centre());
+        matcher.joined(self.moved, radius_m, self.graphs.each_ref())
     }
 
     /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
