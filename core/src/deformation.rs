@@ -8,6 +8,7 @@
 
 use crate::{
     Result,
+    noise_law::NoiseLaw,
     options::Parameters,
     patches::{Patch, Patches},
     spectrum::Basis,
@@ -23,6 +24,8 @@ pub type Observed = [Option<[f64; 2]>];
 
 /// Standard deviation of the shift of a whole patch, metres: as good as free.
 const SHIFT_M: f64 = 1.0;
+/// Displacements are never trusted to better than this.
+const LEAST_NOISE_M: f64 = 0.01;
 /// Patches, and vertices of each, on which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
 const SAMPLE_VERTICES: usize = 200;
@@ -57,6 +60,34 @@ pub struct Prediction {
     pub displacement_m: Vec<[f64; 2]>,
     /// Of every reference vertex: 1, or less where its displacement does not fit in with the others.
     pub weights: Vec<f64>,
+}
+
+impl Prediction {
+    /// What to demodulate in place of `observed`: what the deformation leaves of every displacement goes
+    /// through the [`NoiseLaw`] that fits, and the noise becomes as small as that makes it.
+    pub fn shape_noise(
+        mut self,
+        patches: &Patches,
+        observed: &Observed,
+        carriers: usize,
+        amplitude_m: f64,
+    ) -> (Vec<Option<[f64; 2]>>, Self) {
+        let residual = |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [o[0] - f[0], o[1] - f[1]]);
+        let residuals: Vec<[f64; 2]> =
+            observed.iter().zip(&self.displacement_m).filter_map(residual).collect();
+        let law = NoiseLaw::of(residuals.as_flattened());
+        if law.exponent == 2.0 {
+            return (observed.to_vec(), self);
+        }
+        let share = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
+        let noise2 = law.variance_m2 - amplitude_m.powi(2) * share;
+        self.deformation.noise_m = noise2.max(LEAST_NOISE_M.powi(2)).sqrt();
+        let shaped = observed.iter().zip(&self.displacement_m).map(|(o, f)| {
+            let axis = |o: &[f64; 2], a: usize| f[a] + law.apply(o[a] - f[a]);
+            o.as_ref().map(|o| [axis(o, 0), axis(o, 1)])
+        });
+        (shaped.collect(), self)
+    }
 }
 
 impl Deformation {

@@ -46,6 +46,7 @@ pub mod ground;
 pub mod key;
 pub mod mesh;
 pub mod message;
+pub mod noise_law;
 pub mod options;
 pub mod patches;
 pub mod record;

@@ -284,7 +284,7 @@ impl Tracking<'_> {
             let amplitude_m = request.parameters.amplitude_m;
             let prediction = deformation.predict(self.patches, &observed, carriers, amplitude_m);
             if deformation.deviation_m == 0.0 || round == ROUNDS {
-                return Ok((observed, prediction));
+                return Ok(prediction.shape_noise(self.patches, &observed, carriers, amplitude_m));
             }
             observed = self.displacements(&self.match_around(&prediction, request.radius_m));
             round += 1;
