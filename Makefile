@@ -7,10 +7,12 @@ PLUGIN := $(PLUGINS)/ogr_MESHMARK.so
 PREFIX ?= /usr/local
 # GDAL's own plugin folder, where every program finds the driver without a variable.
 GDAL_PLUGIN_DIR ?= $(shell pkg-config --variable=libdir gdal 2>/dev/null || echo $(PREFIX)/lib)/gdalplugins
-# Maps that `make bench` measures; name your own with MAPS="a.gpkg b.gpkg".
-MAPS ?= $(or $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/jp_tokyo_adachi_6km.gpkg),fixtures/helsinki.gpkg)
+# What the studies below run on; name your own with MAPS="a.gpkg folder".
+BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/jp_tokyo_adachi_6km.gpkg)
+STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
+FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench conformance install uninstall fixtures deps lint
+.PHONY: build test demo bench table2 conformance install uninstall fixtures deps lint
 
 build: deps
 	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
@@ -25,7 +27,12 @@ demo: build
 
 bench: build
 	$(CARGO) build --release --locked -p meshmark-host-tests --bins
-	$(BUILD)/bench $(MAPS)
+	$(BUILD)/bench $(or $(MAPS),$(BENCH_MAPS),$(FIXTURES))
+
+# The paper's Table 2 and more, on maps in metres; about an hour for the nine maps of docs/evaluation.md.
+table2: build
+	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(BUILD)/table2 --out target/table2 $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 conformance: build
 	host-tests/conformance/run.sh

@@ -43,6 +43,8 @@ pub enum Attack {
     Snap { spacing: f64 },
     /// Uniform noise on both coordinates of every vertex.
     Noise { half_width: f64 },
+    /// Gaussian noise on both coordinates of every vertex.
+    GaussianNoise { deviation: f64 },
     /// Cells of a grid turned by this angle, to alternating sides.
     Deform { cell: Cell, degrees: f64, side: Side },
     /// A window cut out.
@@ -83,7 +85,10 @@ impl Attack {
             Attack::Translate(by) => Ok(similarity::translate(map, *by)),
             Attack::Linear(matrix, about) => similarity::linear(map, *matrix, *about),
             Attack::Snap { spacing } => Ok(noise::snap(map, *spacing)),
-            Attack::Noise { half_width } => noise::add(map, *half_width, seed),
+            Attack::Noise { half_width } => noise::add(map, seed, |random| random.symmetric(*half_width)),
+            Attack::GaussianNoise { deviation } => {
+                noise::add(map, seed, |random| deviation * random.normal())
+            }
             Attack::Deform { cell, degrees, side } => deformation::deform(map, *cell, *degrees, *side),
             Attack::Crop(window) => crop::crop(map, *window),
             Attack::InsertVertices { count } => vertices::insert(map, *count, seed),

@@ -1,14 +1,13 @@
 //! Noise and rounding.
 
-use super::{Map, Result, random::PerVertex};
+use super::{Map, Random, Result, random::PerVertex};
 
-/// Adds uniform noise to both coordinates of every vertex, units of the CRS.
+/// Adds a number that `draw` makes to either coordinate of every vertex, units of the CRS.
 ///
 /// # Errors
 /// Coordinates that are not finite.
-pub fn add(map: &Map, half_width: f64, seed: u64) -> Result<Map> {
-    let noise =
-        PerVertex::draw(map, seed, |random| [random.symmetric(half_width), random.symmetric(half_width)])?;
+pub fn add(map: &Map, seed: u64, draw: impl Fn(&mut Random) -> f64) -> Result<Map> {
+    let noise = PerVertex::draw(map, seed, |random| [draw(random), draw(random)])?;
     Ok(map.map_coords(|vertex| {
         let [dx, dy] = noise.at(vertex);
         [vertex[0] + dx, vertex[1] + dy]
@@ -35,20 +34,20 @@ mod tests {
     #[test]
     fn noise_fills_its_square_and_a_seed_repeats_it() {
         let map = fixture("kotka.gpkg");
-        let noisy = add(&map, 0.3, 5).unwrap();
+        let noisy = add(&map, 5, |random| random.symmetric(0.3)).unwrap();
         let moved: Vec<[f64; 2]> = pairs(&map, &noisy).map(|(a, b)| [b[0] - a[0], b[1] - a[1]]).collect();
         let most = moved.iter().flatten().fold(0f64, |a, b| a.max(b.abs()));
         assert!(most <= 0.3 + 1e-8 && most > 0.299, "{most}");
         let mean_square = moved.iter().flatten().map(|d| d * d).sum::<f64>() / (2 * moved.len()) as f64;
         assert!((mean_square - 0.03).abs() < 0.002, "variance of a uniform distribution: {mean_square}");
-        assert_eq!(noisy, add(&map, 0.3, 5).unwrap());
-        assert_ne!(noisy, add(&map, 0.3, 6).unwrap());
+        assert_eq!(noisy, add(&map, 5, |random| random.symmetric(0.3)).unwrap());
+        assert_ne!(noisy, add(&map, 6, |random| random.symmetric(0.3)).unwrap());
     }
 
     #[test]
     fn shared_walls_stay_shared() {
         let map = fixture("helsinki.gpkg");
-        assert_shared_vertices_stay_shared(&map, &add(&map, 0.5, 1).unwrap());
+        assert_shared_vertices_stay_shared(&map, &add(&map, 1, |random| random.symmetric(0.5)).unwrap());
     }
 
     #[test]

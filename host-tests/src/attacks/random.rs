@@ -31,6 +31,12 @@ impl Random {
         (2.0 * self.unit() - 1.0) * half_width
     }
 
+    /// Standard normal (Box and Muller 1958).
+    pub fn normal(&mut self) -> f64 {
+        let (radius, turn) = (-2.0 * (1.0 - self.unit()).ln(), std::f64::consts::TAU * self.unit());
+        radius.sqrt() * turn.cos()
+    }
+
     /// Uniform in 0 … count − 1; `count` is far below 2⁶⁴, so the remainder is as good as uniform.
     pub fn below(&mut self, count: usize) -> usize {
         (self.0.next_u64() % count as u64) as usize

@@ -89,7 +89,7 @@ pub fn extended_rows(foreign: Arc<Map>) -> Vec<Row> {
 }
 
 fn geometric() -> Vec<Row> {
-    use Attack::{DropAttributes, Linear, Noise, Sequence, Snap, Square};
+    use Attack::{DropAttributes, GaussianNoise, Linear, Noise, Sequence, Snap, Square};
     let cells = Cell::Size([75.0, 50.0]);
     let about = About::Centre;
     let rows = [
@@ -100,6 +100,7 @@ fn geometric() -> Vec<Row> {
         ),
         ("grid10", "10 × 10 cells over the map, ±1°", deformed(Cell::Share(10), Side::Cell)),
         ("noise1", "noise ±1 m", Noise { half_width: 1.0 }),
+        ("gauss29", "Gaussian noise of the same variance as ±50 cm", GaussianNoise { deviation: 0.289 }),
         ("snap25", "snapped to 0.25 m", Snap { spacing: 0.25 }),
         ("snap50", "snapped to 0.5 m", Snap { spacing: 0.5 }),
         ("stretch", "x × 1.3, y × 0.8", Linear(scaling(1.3, 0.8), about)),

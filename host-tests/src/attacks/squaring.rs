@@ -136,7 +136,8 @@ mod tests {
 
     #[test]
     fn a_noisy_town_is_squarer_afterwards() {
-        let noisy = crate::attacks::noise::add(&fixture("kotka.gpkg"), 0.2, 1).unwrap();
+        let noisy =
+            crate::attacks::noise::add(&fixture("kotka.gpkg"), 1, |random| random.symmetric(0.2)).unwrap();
         let skew = |map: &Map| {
             let skews: Vec<f64> = skews_degrees(map).into_iter().filter(|s| *s < 10.0).collect();
             skews.iter().sum::<f64>() / skews.len() as f64

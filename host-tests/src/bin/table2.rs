@@ -6,7 +6,7 @@ use meshmark_host_tests::table2::{
     cases::{Case, Table},
     experiment::{Outcome, Plan, run},
     figures, markdown,
-    product::Product,
+    product::{Product, Profile},
 };
 use std::{
     path::{Path, PathBuf},
@@ -61,13 +61,17 @@ fn run_all(arguments: Arguments) -> Result<()> {
         None => Product::of_this_build()?,
     };
     let (quick, rows) = (arguments.quick, arguments.rows.clone());
-    let wanted = move |case: &Case| match rows.is_empty() {
-        true => !quick || case.table() == Table::Paper,
+    let wanted = move |case: &Case, profile: Profile| match rows.is_empty() {
+        // The paper's two chip rates on its own rows; on all others the default and the coded message.
+        true => case.table() == Table::Paper || (!quick && profile != Profile::repetition(3)),
         false => rows.contains(&case.id()),
     };
     let plan = Plan {
         maps: geopackages(&arguments.maps)?,
-        chip_rates: if quick { vec![2] } else { vec![2, 3] },
+        profiles: match quick {
+            true => vec![Profile::repetition(2)],
+            false => vec![Profile::repetition(2), Profile::repetition(3), Profile::LDPC],
+        },
         wanted: Box::new(wanted),
         seed: arguments.seed,
         workers: arguments.jobs.max(1),
@@ -114,9 +118,9 @@ fn geopackages(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 fn print(o: &Outcome) {
     let errors = o.bit_errors.map_or("not registered".into(), |errors| format!("{errors} of {}", o.bits));
     println!(
-        "{:20} c={} {:12} {:6} {:12} {errors}, {} ({:.1} s)",
+        "{:20} {:4} {:12} {:6} {:12} {errors}, {} ({:.1} s)",
         o.map,
-        o.chip_rate,
+        o.profile.name(),
         o.case,
         o.demodulator,
         o.asked,

@@ -1,5 +1,6 @@
 //! What is done to a marked map, and who is asked about afterwards.
 
+use super::product::Profile;
 use crate::attacks::{Map, Row, extended_rows, paper_rows};
 use std::sync::Arc;
 
@@ -58,10 +59,12 @@ impl Case {
         }
     }
 
-    /// The demodulators it is measured with: colluders are many, so they only meet the default one.
-    pub fn demodulators(&self) -> &'static [&'static str] {
+    /// The demodulators it is measured with: colluders are many, so they only meet the default one, and the paper
+    /// has no code.
+    pub fn demodulators(&self, profile: Profile) -> &'static [&'static str] {
         match self {
             Case::Collusion { .. } => &["joint"],
+            _ if profile == Profile::LDPC => &["joint"],
             _ => &DEMODULATORS,
         }
     }

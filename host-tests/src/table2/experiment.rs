@@ -3,7 +3,7 @@
 use super::{
     Result,
     cases::{Case, INNOCENTS, Table, all},
-    product::{Asked, Marking, Product, Report, write_key},
+    product::{Asked, Marking, Product, Profile, Report, write_key},
 };
 use crate::attacks::{Map, collusion, noise, similarity};
 use meshmark_core::ground::Ground;
@@ -21,12 +21,15 @@ use std::{
 /// The paper's maps have integer coordinates in units of 10 cm.
 const PRECISION_M: f64 = 0.1;
 
+/// Which cases are run with which profile.
+pub type Wanted = dyn Fn(&Case, Profile) -> bool;
+
 /// What to run.
 pub struct Plan {
     pub maps: Vec<PathBuf>,
-    pub chip_rates: Vec<usize>,
-    /// Whether a case is run at all.
-    pub wanted: Box<dyn Fn(&Case) -> bool>,
+    pub profiles: Vec<Profile>,
+    /// Whether a case is run at all with this profile.
+    pub wanted: Box<Wanted>,
     pub seed: u64,
     /// Processes at a time.
     pub workers: usize,
@@ -39,7 +42,8 @@ pub struct Plan {
 pub struct Outcome {
     pub table: Table,
     pub map: String,
-    pub chip_rate: usize,
+    #[serde(flatten)]
+    pub profile: Profile,
     pub case: String,
     pub title: String,
     pub strength: Option<f64>,
@@ -75,10 +79,10 @@ struct Copy {
     record: PathBuf,
 }
 
-/// A map with its marked copies at one chip rate.
+/// A map with its copies marked in one way.
 struct Sheet {
     name: String,
-    chip_rate: usize,
+    profile: Profile,
     reference: PathBuf,
     copies: Vec<Copy>,
 }
@@ -117,10 +121,10 @@ pub fn run(product: &Product, plan: &Plan, report: impl Fn(&Outcome) + Sync) -> 
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some((sheet, case)) = jobs.get(number) else { return Ok(()) };
-            let Sheet { name, chip_rate, .. } = &sheets[*sheet];
+            let Sheet { name, profile, .. } = &sheets[*sheet];
             let outcomes = lab
                 .run_case(&sheets[*sheet], case)
-                .map_err(|error| format!("{name}, chip rate {chip_rate}, case {}: {error}", case.id()))?;
+                .map_err(|error| format!("{name}, {}, case {}: {error}", profile.name(), case.id()))?;
             outcomes.iter().for_each(&report);
             answered.lock().expect("no worker panics with the lock").push((number, outcomes));
         }
@@ -150,7 +154,7 @@ impl Lab<'_> {
         self.folder.join("pirate.json")
     }
 
-    /// Marks all maps at all chip rates, and lists what to do with them.
+    /// Marks all maps in all ways, and lists what to do with them.
     fn prepare(&self, plan: &Plan) -> Result<(Vec<Sheet>, Vec<Job>)> {
         let mut maps = Vec::new();
         for path in &plan.maps {
@@ -165,37 +169,38 @@ impl Lab<'_> {
             }
             let reference = self.folder.join(format!("{name}.gpkg"));
             map.write(&reference)?;
-            let cases: Vec<Case> = all(foreign(&maps, number)?).into_iter().filter(&plan.wanted).collect();
-            let most_copies = cases.iter().map(Case::copies).max().unwrap_or(1);
-            for &chip_rate in &plan.chip_rates {
-                let sheet = format!("{name}-{chip_rate}");
-                let copies = (1..=most_copies).map(|copy| self.mark(&sheet, &reference, chip_rate, copy));
+            for &profile in &plan.profiles {
+                let wanted = |case: &Case| (plan.wanted)(case, profile);
+                let cases: Vec<Case> = all(foreign(&maps, number)?).into_iter().filter(wanted).collect();
+                let most_copies = cases.iter().map(Case::copies).max().unwrap_or(1);
+                let sheet = format!("{name}-{}", profile.name());
+                let copies = (1..=most_copies).map(|copy| self.mark(&sheet, &reference, profile, copy));
                 let copies = copies.collect::<Result<_>>()?;
                 jobs.extend(cases.iter().map(|case| (sheets.len(), case.clone())));
-                sheets.push(Sheet { name: name.clone(), chip_rate, reference: reference.clone(), copies });
+                sheets.push(Sheet { name: name.clone(), profile, reference: reference.clone(), copies });
             }
         }
         jobs.sort_by_key(|(_, case)| case.table()); // the paper's table first, for all maps
         Ok((sheets, jobs))
     }
 
-    fn mark(&self, sheet: &str, reference: &Path, chip_rate: usize, copy: usize) -> Result<Copy> {
+    fn mark(&self, sheet: &str, reference: &Path, profile: Profile, copy: usize) -> Result<Copy> {
         let recipient = format!("recipient {copy}");
         let path = self.folder.join(format!("{sheet}-copy{copy}.gpkg"));
         let record = path.with_extension("json");
-        let marking = Marking { key: &self.key(), recipient: &recipient, chip_rate, precision: PRECISION_M };
+        let marking = Marking { key: &self.key(), recipient: &recipient, profile, precision: PRECISION_M };
         self.product.mark(reference, &path, &record, marking)?;
         Ok(Copy { recipient, path, record })
     }
 
     /// Makes the suspect of a case and asks about everybody.
     fn run_case(&self, sheet: &Sheet, case: &Case) -> Result<Vec<Outcome>> {
-        let suspect = self.folder.join(format!("{}-{}-{}.gpkg", sheet.name, sheet.chip_rate, case.id()));
+        let suspect = self.folder.join(format!("{}-{}-{}.gpkg", sheet.name, sheet.profile.name(), case.id()));
         let seed = seed_of(self.seed, &sheet.name, &case.id());
         let questions = self.make_suspect(sheet, case, seed, &suspect)?;
         let mut outcomes = Vec::new();
         for question in &questions {
-            for demodulator in case.demodulators() {
+            for demodulator in case.demodulators(sheet.profile) {
                 let started = Instant::now();
                 let answer = self.ask(sheet, question, demodulator, &suspect);
                 let seconds = started.elapsed().as_secs_f64();
@@ -224,7 +229,7 @@ impl Lab<'_> {
                 let record = suspect.with_extension("json");
                 let (key, recipient) = (self.pirates_key(), "pirate");
                 let marking =
-                    Marking { key: &key, recipient, chip_rate: sheet.chip_rate, precision: PRECISION_M };
+                    Marking { key: &key, recipient, profile: sheet.profile, precision: PRECISION_M };
                 self.product.mark(&first.path, suspect, &record, marking)?;
                 let pirate = Question {
                     key,
@@ -253,7 +258,7 @@ impl Lab<'_> {
             None => Asked::Marking(Marking {
                 key: &question.key,
                 recipient: &question.asked,
-                chip_rate: sheet.chip_rate,
+                profile: sheet.profile,
                 precision: PRECISION_M,
             }),
         };
@@ -278,7 +283,7 @@ fn outcome(
     Outcome {
         table: case.table(),
         map: sheet.name.clone(),
-        chip_rate: sheet.chip_rate,
+        profile: sheet.profile,
         case: case.id(),
         title: case.title(),
         strength: case.strength(),
@@ -351,7 +356,7 @@ pub(crate) mod tests {
         Outcome {
             table: Table::Paper,
             map: "town".into(),
-            chip_rate,
+            profile: Profile::repetition(chip_rate),
             case: id.into(),
             title: format!("attack {id}"),
             strength: Some(0.5),

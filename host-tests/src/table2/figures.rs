@@ -5,6 +5,7 @@ use super::{
     experiment::Outcome,
     paper,
     plot::{Plot, Series},
+    product::Profile,
     summary::{cell, distinct},
 };
 
@@ -63,15 +64,17 @@ pub fn all(outcomes: &[Outcome]) -> Vec<(&'static str, String)> {
 
 impl Family {
     fn plot(&self, outcomes: &[Outcome]) -> Plot {
-        let of_family: Vec<&Outcome> =
-            outcomes.iter().filter(|o| self.ids.contains(&o.case.as_str())).collect();
+        let of_family: Vec<&Outcome> = outcomes.iter().filter(|o| of_family(self, o)).collect();
         let mut series = Vec::new();
-        for (shade, c) in distinct(of_family.iter().map(|o| o.chip_rate)).into_iter().enumerate() {
+        for (shade, c) in distinct(of_family.iter().map(|o| o.profile.chip_rate)).into_iter().enumerate() {
             let colours = [["#9ecae1", "#08519c", "#4292c6"], ["#fdae6b", "#a63603", "#f16913"]][shade % 2];
             for (demodulator, colour) in DEMODULATORS.into_iter().zip(colours) {
                 let points = points(&of_family, |outcomes| {
                     cell(
-                        outcomes.iter().copied().filter(|o| o.chip_rate == c && o.demodulator == demodulator),
+                        outcomes
+                            .iter()
+                            .copied()
+                            .filter(|o| o.profile.chip_rate == c && o.demodulator == demodulator),
                     )
                     .map(|cell| cell.bit_error_percent)
                 });
@@ -90,6 +93,11 @@ impl Family {
         let (title, x_label) = (self.title.into(), self.x_label.into());
         Plot { title, x_label, log_x: self.log_x, series }
     }
+}
+
+/// Raw bit errors only: with a code there are none, or many.
+fn of_family(family: &Family, outcome: &Outcome) -> bool {
+    family.ids.contains(&outcome.case.as_str()) && outcome.profile != Profile::LDPC
 }
 
 /// One point for every strength, with what `rate` makes of its outcomes.

@@ -4,19 +4,24 @@ use super::{
     cases::{DEMODULATORS, Table},
     experiment::Outcome,
     paper,
+    product::Profile,
     summary::{Cell, bit_error_percent, cell, distinct, is_match},
 };
 use std::fmt::Write;
 
 /// All tables.
-pub fn report(outcomes: &[Outcome], seed: u64, version: &str) -> String {
-    let mut text = head(outcomes, seed, version);
+pub fn report(all: &[Outcome], seed: u64, version: &str) -> String {
+    let (coded, outcomes): (Vec<Outcome>, Vec<Outcome>) =
+        all.iter().cloned().partition(|o| o.profile == Profile::LDPC);
+    let outcomes = outcomes.as_slice();
+    let mut text = head(all, seed, version);
     text += &averages(outcomes, Table::Paper);
     text += &averages(outcomes, Table::Extended);
+    text += &whole_messages(outcomes, &coded);
     text += &special(outcomes);
-    text += &unanswered(outcomes);
+    text += &unanswered(all);
     for table in [Table::Paper, Table::Extended] {
-        for chip_rate in distinct(outcomes.iter().map(|o| o.chip_rate)) {
+        for chip_rate in chip_rates(outcomes.iter()) {
             for demodulator in DEMODULATORS {
                 text += &per_map(outcomes, table, chip_rate, demodulator);
             }
@@ -43,24 +48,24 @@ fn head(outcomes: &[Outcome], seed: u64, version: &str) -> String {
 /// One row for every attack, averaged over maps.
 fn averages(outcomes: &[Outcome], table: Table) -> String {
     let of_table: Vec<&Outcome> = outcomes.iter().filter(|o| o.table == table).collect();
-    let chip_rates = distinct(of_table.iter().map(|o| o.chip_rate));
+    let rates = chip_rates(of_table.iter().copied());
     if of_table.is_empty() {
         return String::new();
     }
     let title = if table == Table::Paper { "Table 2" } else { "Other attacks" };
     let mut text = format!("## {title}\n\n| | attack |");
-    for c in &chip_rates {
+    for c in &rates {
         if table == Table::Paper {
             let _ = write!(text, " c={c} published |");
         }
         let _ = write!(text, " c={c} paper | c={c} joint | match | median p | not registered |");
     }
-    let columns = 2 + chip_rates.len() * if table == Table::Paper { 6 } else { 5 };
+    let columns = 2 + rates.len() * if table == Table::Paper { 6 } else { 5 };
     let _ = writeln!(text, "\n|{}", "---|".repeat(columns));
     for id in distinct(of_table.iter().map(|o| o.case.as_str())) {
         let of_case: Vec<&Outcome> = of_table.iter().copied().filter(|o| o.case == id).collect();
         let _ = write!(text, "| {id} | {} |", of_case[0].title);
-        for &c in &chip_rates {
+        for &c in &rates {
             if table == Table::Paper {
                 let published = paper::bit_error_percent(id, c);
                 let _ = write!(text, " {} |", published.map_or("–".into(), |p| format!("{p:.1}")));
@@ -74,8 +79,13 @@ fn averages(outcomes: &[Outcome], table: Table) -> String {
 
 fn of_chip_rate(outcomes: &[&Outcome], chip_rate: usize) -> String {
     let of = |demodulator: &str| {
-        cell(outcomes.iter().copied().filter(|o| o.chip_rate == chip_rate && o.demodulator == demodulator))
-            .unwrap_or_default()
+        cell(
+            outcomes
+                .iter()
+                .copied()
+                .filter(|o| o.profile.chip_rate == chip_rate && o.demodulator == demodulator),
+        )
+        .unwrap_or_default()
     };
     let [paper, joint] = DEMODULATORS.map(of);
     format!(
@@ -87,6 +97,45 @@ fn of_chip_rate(outcomes: &[&Outcome], chip_rate: usize) -> String {
         p_value(&joint),
         joint.unregistered
     )
+}
+
+fn chip_rates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<usize> {
+    distinct(outcomes.map(|o| o.profile.chip_rate))
+}
+
+/// The coded message beside the repeated one of the same displacement: on how many maps it came back whole.
+fn whole_messages(plain: &[Outcome], coded: &[Outcome]) -> String {
+    if coded.is_empty() {
+        return String::new();
+    }
+    let mut text = "## The whole message, repeated (c=2) and coded (LDPC)\n\n| | attack | raw bit errors, c=2 | repeated: \
+                    whole message | LDPC: whole message | repeated: median p | LDPC: median p |\n\
+                    |---|---|---|---|---|---|---|\n"
+        .to_string();
+    for id in distinct(coded.iter().filter(|o| o.guilty).map(|o| o.case.as_str())) {
+        let of = |outcomes: &[Outcome], chip_rate: usize| -> Vec<Outcome> {
+            let is = |o: &&Outcome| {
+                o.case == id && o.demodulator == "joint" && o.profile.chip_rate == chip_rate && o.guilty
+            };
+            outcomes.iter().filter(is).cloned().collect()
+        };
+        let (plain, coded) = (of(plain, 2), of(coded, 1));
+        let whole = |outcomes: &[Outcome]| {
+            format!("{} of {}", outcomes.iter().filter(|o| o.bit_errors == Some(0)).count(), outcomes.len())
+        };
+        let [plain_cell, coded_cell] = [&plain, &coded].map(|outcomes| cell(outcomes).unwrap_or_default());
+        let _ = writeln!(
+            text,
+            "| {id} | {} | {:.1} | {} | {} | {} | {} |",
+            coded[0].title,
+            plain_cell.bit_error_percent,
+            whole(&plain),
+            whole(&coded),
+            p_value(&plain_cell),
+            p_value(&coded_cell)
+        );
+    }
+    text + "\n"
 }
 
 fn p_value(cell: &Cell) -> String {
@@ -104,11 +153,14 @@ fn special(outcomes: &[Outcome]) -> String {
                     accused | lowest p of an innocent |\n|---|---|---|---|---|---|---|\n"
             .to_string();
     for id in distinct(of_table.iter().map(|o| o.case.as_str())) {
-        for c in distinct(of_table.iter().map(|o| o.chip_rate)) {
+        for c in chip_rates(of_table.iter().copied()) {
             for demodulator in DEMODULATORS {
                 let of = |guilty: bool| -> Vec<&Outcome> {
                     let is = |o: &&&Outcome| {
-                        o.case == id && o.chip_rate == c && o.demodulator == demodulator && o.guilty == guilty
+                        o.case == id
+                            && o.profile.chip_rate == c
+                            && o.demodulator == demodulator
+                            && o.guilty == guilty
                     };
                     of_table.iter().filter(is).copied().collect()
                 };
@@ -140,18 +192,19 @@ fn unanswered(outcomes: &[Outcome]) -> String {
     let rows: String = outcomes
         .iter()
         .filter(is)
-        .map(|o| format!("| {} | {} | {} | {} | {} |\n", o.map, o.chip_rate, o.case, o.title, o.reason))
+        .map(|o| format!("| {} | {} | {} | {} | {} |\n", o.map, o.profile.name(), o.case, o.title, o.reason))
         .collect();
     if rows.is_empty() {
         return "Every suspect was registered.\n\n".into();
     }
     format!(
-        "## Not registered\n\n| map | chip rate | | attack | what the verifier said |\n|---|---|---|---|---|\n{rows}\n"
+        "## Not registered\n\n| map | profile | | attack | what the verifier said |\n|---|---|---|---|---|\n{rows}\n"
     )
 }
 
 fn per_map(outcomes: &[Outcome], table: Table, chip_rate: usize, demodulator: &str) -> String {
-    let is = |o: &&Outcome| o.table == table && o.chip_rate == chip_rate && o.demodulator == demodulator;
+    let is =
+        |o: &&Outcome| o.table == table && o.profile.chip_rate == chip_rate && o.demodulator == demodulator;
     let rows: Vec<&Outcome> = outcomes.iter().filter(is).collect();
     let maps = distinct(rows.iter().map(|o| o.map.as_str()));
     if rows.is_empty() {
@@ -192,7 +245,7 @@ mod tests {
     fn a_suspect_that_was_not_registered_is_named() {
         let text = report(&[outcome("4a", 3, "paper", None), outcome("4a", 3, "joint", None)], 7, "");
         assert!(text.contains("| 4a | attack 4a | 0.0 | 50.0 | 50.0 | 0 of 1 | – | 1 |"), "{text}");
-        assert!(text.contains("| town | 3 | 4a | attack 4a | so it is |"), "{text}");
+        assert!(text.contains("| town | c=3 | 4a | attack 4a | so it is |"), "{text}");
         assert!(text.contains("| 4a | attack 4a | n. r. |"), "{text}");
     }
 

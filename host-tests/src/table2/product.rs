@@ -2,7 +2,7 @@
 
 use super::Result;
 use meshmark_core::key::SecretKey;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::{
     path::{Path, PathBuf},
     process::{Command, Output},
@@ -15,12 +15,37 @@ pub struct Product {
     plugins: PathBuf,
 }
 
+/// How the bits of the message become chips.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Profile {
+    pub code: &'static str,
+    pub chip_rate: usize,
+}
+
+impl Profile {
+    /// The paper's: every bit is c chips.
+    pub const fn repetition(chip_rate: usize) -> Self {
+        Profile { code: "REPETITION", chip_rate }
+    }
+
+    /// 256 code bits of one chip each: the displacement of c = 2.
+    pub const LDPC: Profile = Profile { code: "LDPC", chip_rate: 1 };
+
+    /// A short name.
+    pub fn name(&self) -> String {
+        match self {
+            &Profile::LDPC => "LDPC".into(),
+            other => format!("c={}", other.chip_rate),
+        }
+    }
+}
+
 /// How a copy is marked.
 #[derive(Debug, Clone, Copy)]
 pub struct Marking<'a> {
     pub key: &'a Path,
     pub recipient: &'a str,
-    pub chip_rate: usize,
+    pub profile: Profile,
     /// Grid of the output, CRS units.
     pub precision: f64,
 }
@@ -115,7 +140,8 @@ impl Product {
         let options = [
             ("KEY", marking.key.display().to_string()),
             ("RECIPIENT", marking.recipient.into()),
-            ("CHIP_RATE", marking.chip_rate.to_string()),
+            ("CODE", marking.profile.code.into()),
+            ("CHIP_RATE", marking.profile.chip_rate.to_string()),
             ("PRECISION", marking.precision.to_string()),
             ("RECORD", record.display().to_string()),
         ];
@@ -148,7 +174,8 @@ impl Product {
             Asked::Record(record) => command.arg("--record").arg(record),
             Asked::Marking(marking) => command
                 .args(["--recipient", marking.recipient])
-                .arg(format!("--chip-rate={}", marking.chip_rate))
+                .args(["--code", marking.profile.code])
+                .arg(format!("--chip-rate={}", marking.profile.chip_rate))
                 .arg(format!("--precision={}", marking.precision)),
         };
         let output = command.arg(suspect).output()?;
