@@ -2,6 +2,8 @@ pub mod attacks;
 pub mod cgal;
 pub mod contents;
 pub mod delaunay_check;
+pub mod false_alarms;
+pub mod plot;
 pub mod plugin;
 pub mod table2;
 pub mod vectors;

@@ -133,7 +133,7 @@ fn write(folder: &Path, outcomes: &[Outcome], seed: u64, version: &str) -> Resul
     std::fs::write(folder.join("table2.md"), markdown::report(outcomes, seed, version))?;
     let json = serde_json::json!({ "seed": seed, "software": version, "outcomes": outcomes });
     std::fs::write(folder.join("table2.json"), serde_json::to_string_pretty(&json)? + "\n")?;
-    for (file, svg) in figures::all(outcomes) {
+    for (file, svg) in figures::all(outcomes)? {
         std::fs::write(folder.join(file), svg)?;
     }
     Ok(())

@@ -1,13 +1,15 @@
 //! The figures: which attacks make a line, and which lines a plot.
 
 use super::{
+    Result,
     cases::DEMODULATORS,
     experiment::Outcome,
     paper,
-    plot::{Plot, Series},
     product::Profile,
     summary::{cell, distinct},
 };
+use crate::plot::{Axis, Plot, Series};
+use plotters::style::RGBColor;
 
 /// A family of attacks in several strengths.
 struct Family {
@@ -57,17 +59,25 @@ const FAMILIES: [Family; 5] = [
 ];
 
 /// File names and drawings, of those families that were measured.
-pub fn all(outcomes: &[Outcome]) -> Vec<(&'static str, String)> {
+///
+/// # Errors
+/// A plot cannot be drawn.
+pub fn all(outcomes: &[Outcome]) -> Result<Vec<(&'static str, String)>> {
     let drawn = FAMILIES.iter().map(|family| (family.file, family.plot(outcomes)));
-    drawn.filter(|(_, plot)| !plot.series.is_empty()).map(|(file, plot)| (file, plot.to_svg())).collect()
+    let shown = drawn.filter(|(_, plot)| !plot.series.is_empty());
+    shown.map(|(file, plot)| Ok((file, plot.to_svg()?))).collect()
 }
+
+/// Light, dark and middle: both demodulators and what was published.
+const BLUES: [RGBColor; 3] = [RGBColor(158, 202, 225), RGBColor(8, 81, 156), RGBColor(66, 146, 198)];
+const ORANGES: [RGBColor; 3] = [RGBColor(253, 174, 107), RGBColor(166, 54, 3), RGBColor(241, 105, 19)];
 
 impl Family {
     fn plot(&self, outcomes: &[Outcome]) -> Plot {
         let of_family: Vec<&Outcome> = outcomes.iter().filter(|o| of_family(self, o)).collect();
         let mut series = Vec::new();
         for (shade, c) in distinct(of_family.iter().map(|o| o.profile.chip_rate)).into_iter().enumerate() {
-            let colours = [["#9ecae1", "#08519c", "#4292c6"], ["#fdae6b", "#a63603", "#f16913"]][shade % 2];
+            let colours = [BLUES, ORANGES][shade % 2];
             for (demodulator, colour) in DEMODULATORS.into_iter().zip(colours) {
                 let points = points(&of_family, |outcomes| {
                     cell(
@@ -78,7 +88,7 @@ impl Family {
                     )
                     .map(|cell| cell.bit_error_percent)
                 });
-                series.push(Series { name: format!("c={c}, {demodulator}"), points, colour, dashed: false });
+                series.push(Series { name: format!("c={c}, {demodulator}"), points, colour, thin: false });
             }
             let published = points(&of_family, |outcomes| {
                 let ids = distinct(outcomes.iter().map(|o| o.case.as_str()));
@@ -87,11 +97,11 @@ impl Family {
             });
             if !published.is_empty() {
                 let name = format!("c={c}, published 2003");
-                series.push(Series { name, points: published, colour: colours[2], dashed: true });
+                series.push(Series { name, points: published, colour: colours[2], thin: true });
             }
         }
-        let (title, x_label) = (self.title.into(), self.x_label.into());
-        Plot { title, x_label, log_x: self.log_x, series }
+        let x = Axis { label: self.x_label.into(), log: self.log_x };
+        Plot { title: self.title.into(), x, y: Axis::linear("bit errors, %"), series }
     }
 }
 

@@ -8,7 +8,6 @@ pub mod experiment;
 pub mod figures;
 pub mod markdown;
 pub mod paper;
-pub mod plot;
 pub mod product;
 pub mod summary;
 

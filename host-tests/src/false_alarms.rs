@@ -1,0 +1,252 @@
+//! How often the verifier would accuse the innocent: p-values of wrong keys and of wrong recipients, which must be
+//! uniform. A suspect is examined once as `meshmark verify` does; what depends on key and recipient is then repeated
+//! for many of them.
+
+use crate::{
+    attacks::{Attack, Map, Random, noise, paper_rows},
+    plot::{Axis, Plot, Series},
+    table2::{
+        Result,
+        product::{Marking, Product, Profile, write_key},
+    },
+};
+use meshmark_core::{
+    carrier::{Carrier, bit_of_coefficient},
+    demodulation::Demodulation,
+    key::SecretKey,
+    options::Parameters,
+};
+use meshmark_verifier::{
+    Demodulator, Request, decision::decide, progress::Progress, registration::Start, verify,
+};
+use plotters::style::{BLACK, BLUE, RED};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// The grid of the maps, as in the paper's experiments.
+const PRECISION_M: f64 = 0.1;
+
+/// What was done to a suspect, and the p-values it gave.
+#[derive(Debug, Serialize)]
+pub struct Sample {
+    pub map: String,
+    pub suspect: &'static str,
+    /// log₁₀ of p_mark under wrong keys.
+    pub wrong_keys: Vec<f64>,
+    /// log₁₀ of p_recipient of wrong recipients under the right key.
+    pub wrong_recipients: Vec<f64>,
+}
+
+/// A kind of suspect: its name, whether it is marked, and the row of Table 2 that it is put through.
+const SUSPECTS: [(&str, bool, Option<&str>); 6] = [
+    ("marked", true, None),
+    ("marked, noise ±50 cm", true, Some("9c")),
+    ("marked, middle 1/16", true, Some("10-8")),
+    ("marked, local deformation", true, Some("6")),
+    ("unmarked, noise ±10 cm", false, Some("9a")),
+    ("unmarked, local deformation", false, Some("6")),
+];
+
+/// Takes `count` wrong keys and as many wrong recipients to every suspect made of one map. The right key and the
+/// wrong ones come from `seed`.
+///
+/// # Errors
+/// A map that cannot be read, marked or registered.
+pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<Vec<Sample>> {
+    let folder = tempfile::tempdir()?;
+    let path = |name: &str| folder.path().join(name);
+    let (key, reference, marked) = (path("key.json"), path("reference.gpkg"), path("marked.gpkg"));
+    write_key(&key, seed)?;
+    let original = noise::snap(&Map::read(map)?, PRECISION_M);
+    original.write(&reference)?;
+    let (recipient, profile) = ("the recipient", Profile::repetition(2));
+    let marking = Marking { key: &key, recipient, profile, precision: PRECISION_M };
+    product.mark(&reference, &marked, &path("record.json"), marking)?;
+    let marked = Map::read(&marked)?;
+    let key = SecretKey::from_json(&std::fs::read_to_string(&key)?)?;
+    let name = map.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let sample = |(suspect, is_marked, row): (&'static str, bool, Option<&str>)| {
+        let file = path("suspect.gpkg");
+        let attacked = attack(row).apply(if is_marked { &marked } else { &original }, seed)?;
+        attacked.write(&file)?;
+        let found = examine(&key, &reference, &file)?;
+        std::fs::remove_file(&file)?;
+        let mut random = Random::new(seed);
+        Ok(Sample {
+            map: name.clone(),
+            suspect,
+            wrong_keys: (0..count).map(|_| wrong_key(&found, &mut random)).collect(),
+            wrong_recipients: (0..count).map(|i| wrong_recipient(&found, &key, i)).collect(),
+        })
+    };
+    SUSPECTS.into_iter().map(sample).collect()
+}
+
+fn attack(row: Option<&str>) -> Attack {
+    let found = paper_rows().into_iter().find(|r| Some(r.id.as_str()) == row);
+    found.map_or(Attack::Sequence(Vec::new()), |row| row.attack)
+}
+
+fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodulation> {
+    let request = Request {
+        key: key.clone(),
+        reference: reference.into(),
+        suspect: suspect.into(),
+        record: None,
+        recipient: None,
+        expected: None,
+        bits: 128,
+        parameters: Parameters { precision: Some(PRECISION_M), ..Parameters::default() },
+        layers: None,
+        srs: None,
+        landmarks: Vec::new(),
+        registration: Start::Auto,
+        demodulator: Demodulator::Joint,
+        radius_m: 1.0,
+        significance: 1e-6,
+    };
+    let mut progress = Progress::default();
+    let map = verify::read_reference(&request, &mut progress)?;
+    Ok(verify::examine(&request, &map, &mut progress)?.found?)
+}
+
+/// log₁₀ of p_mark of one more key and its message for a recipient.
+fn wrong_key(found: &Demodulation, random: &mut Random) -> f64 {
+    let mut secret = [0; 32];
+    secret.chunks_mut(8).for_each(|bytes| bytes.copy_from_slice(&random.seed().to_le_bytes()));
+    let key = SecretKey::from_bytes(secret);
+    let (carrier, chip_rate) = (Carrier::new(&key), Parameters::default().chip_rate);
+    let carriers = found.scores.len() * chip_rate;
+    let mut scores = vec![0.0; found.scores.len()];
+    for (number, correlations) in found.chip_correlations.chunks(carriers).enumerate() {
+        let chips = carrier.chips(number / 2, number % 2, carriers);
+        for (i, (chip, correlation)) in chips.iter().zip(correlations).enumerate() {
+            scores[bit_of_coefficient(i + 1, chip_rate)] += chip * correlation;
+        }
+    }
+    let under_key = Demodulation { scores, ..found.clone() };
+    let decision = decide(&under_key, Some(&key.recipient_message("the recipient")), 1e-6);
+    decision.p_mark_log10.expect("a message was expected")
+}
+
+fn wrong_recipient(found: &Demodulation, key: &SecretKey, number: usize) -> f64 {
+    let message = key.recipient_message(&format!("innocent {number}"));
+    decide(found, Some(&message), 1e-6).p_recipient_log10.expect("a message was expected")
+}
+
+/// How far values are from uniform on [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Uniformity {
+    pub count: usize,
+    /// The Kolmogorov–Smirnov distance.
+    pub distance: f64,
+    /// The probability of that distance or more if they were uniform.
+    pub p_value: f64,
+    /// The smallest value.
+    pub least: f64,
+}
+
+impl Uniformity {
+    /// Kolmogorov–Smirnov test with the small-sample factor of Stephens 1970.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let n = values.len() as f64;
+        let gap = |(i, v): (usize, &f64)| ((i + 1) as f64 / n - v).max(v - i as f64 / n);
+        let distance = values.iter().enumerate().map(gap).fold(0.0, f64::max);
+        let lambda = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
+        let term = |k: i32| (-1f64).powi(k - 1) * (-2.0 * f64::from(k * k) * lambda * lambda).exp();
+        let p_value = (2.0 * (1..100).map(term).sum::<f64>()).clamp(0.0, 1.0);
+        Uniformity { count: values.len(), distance, p_value, least: values[0] }
+    }
+}
+
+/// The p-values of some samples, wrong keys first.
+pub fn pooled<'a>(samples: impl Iterator<Item = &'a Sample>) -> [Vec<f64>; 2] {
+    let mut pools = [Vec::new(), Vec::new()];
+    for sample in samples {
+        pools[0].extend(sample.wrong_keys.iter().map(|p| 10f64.powf(*p)));
+        pools[1].extend(sample.wrong_recipients.iter().map(|p| 10f64.powf(*p)));
+    }
+    pools
+}
+
+/// Observed against expected p-values, −log₁₀: a straight line when they are uniform.
+///
+/// # Errors
+/// As [`Plot::to_svg`].
+pub fn quantile_plot(pools: &[Vec<f64>; 2]) -> Result<String> {
+    let series = |name: &str, values: &Vec<f64>, colour| {
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let n = sorted.len() as f64;
+        let point = |(i, p): (usize, &f64)| (-((i as f64 + 0.5) / n).log10(), -p.log10());
+        // The many large ones would hide each other: all of the first hundred, then ever fewer.
+        let shown = |i: &usize| *i < 100 || i.is_multiple_of(*i / 50);
+        let points = sorted.iter().enumerate().filter(|(i, _)| shown(i)).map(point).collect();
+        Series { name: name.into(), points, colour, thin: false }
+    };
+    let ends = (0.0, (2.0 * pools[0].len() as f64).log10());
+    let diagonal = vec![(ends.0, ends.0), (ends.1, ends.1)];
+    Plot {
+        title: "p-values of the innocent".into(),
+        x: Axis::linear("expected, −log10 p"),
+        y: Axis::linear("observed, −log10 p"),
+        series: vec![
+            Series { name: "uniform".into(), points: diagonal, colour: BLACK, thin: true },
+            series("wrong keys", &pools[0], BLUE),
+            series("wrong recipients", &pools[1], RED),
+        ],
+    }
+    .to_svg()
+}
+
+/// The result as Markdown.
+pub fn markdown(samples: &[Sample], seed: u64) -> String {
+    let mut text = format!(
+        "Seed {seed}. Kolmogorov–Smirnov distance D from the uniform distribution, and the probability of as much or more.\n\n\
+         | suspects | wrong keys | D | p of D | least p | wrong recipients | D | p of D | least p |\n|{}\n",
+        "---|".repeat(9)
+    );
+    let mut row = |name: &str, samples: Vec<&Sample>| {
+        let [keys, recipients] = pooled(samples.into_iter()).map(Uniformity::of);
+        let cells =
+            |u: Uniformity| format!("{} | {:.4} | {:.2} | {:.1e}", u.count, u.distance, u.p_value, u.least);
+        text += &format!("| {name} | {} | {} |\n", cells(keys), cells(recipients));
+    };
+    for (name, ..) in SUSPECTS {
+        row(name, samples.iter().filter(|s| s.suspect == name).collect());
+    }
+    row("all", samples.iter().collect());
+    text
+}
+
+/// Where the results go: `false_alarms.md`, `.json` and `.svg`.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(folder: &Path, samples: &[Sample], seed: u64) -> Result<PathBuf> {
+    std::fs::create_dir_all(folder)?;
+    let table = folder.join("false_alarms.md");
+    std::fs::write(&table, markdown(samples, seed))?;
+    let json = serde_json::json!({ "seed": seed, "samples": samples });
+    std::fs::write(folder.join("false_alarms.json"), serde_json::to_string(&json)? + "\n")?;
+    std::fs::write(folder.join("false_alarms.svg"), quantile_plot(&pooled(samples.iter()))?)?;
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uniform_numbers_pass_and_squares_of_them_do_not() {
+        let mut random = Random::new(1);
+        let uniform: Vec<f64> = (0..5000).map(|_| random.unit()).collect();
+        assert!(Uniformity::of(uniform.clone()).p_value > 0.01);
+        assert!(Uniformity::of(uniform.iter().map(|u| u * u).collect()).p_value < 1e-9);
+        // Stephens 1970: 1.358 is the 5 % point of (√n + 0.12 + 0.11/√n) D.
+        let distance = 1.358 / (10.0 + 0.12 + 0.011);
+        let shifted = (1..=100).map(|i| (f64::from(i) / 100.0 - distance).max(0.0)).collect();
+        assert!((Uniformity::of(shifted).p_value - 0.05).abs() < 0.001);
+    }
+}
