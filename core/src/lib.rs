@@ -51,6 +51,7 @@ pub mod options;
 pub mod patches;
 pub mod record;
 pub mod spectrum;
+mod tridiagonal;
 pub mod vertices;
 
 pub use error::{Error, Result};

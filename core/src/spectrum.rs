@@ -1,11 +1,11 @@
 //! The mesh spectrum of a patch: eigenvectors of its Laplacian, low frequencies first
 //! (paper, section 3.3).
 
-use crate::{Error, Result, patches::Patch};
+use crate::{Error, Result, patches::Patch, tridiagonal::Tridiagonal};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::evd::{self, SelfAdjointEvdParams, tridiag};
+use faer::linalg::evd::tridiag::{self, TridiagParams};
 use faer::linalg::{householder, qr};
-use faer::{Auto, Conj, Mat, MatRef, Par};
+use faer::{Auto, Conj, Mat, MatRef, Par, Spec};
 use rand_chacha::{
     ChaCha20Rng,
     rand_core::{Rng, SeedableRng},
@@ -41,22 +41,21 @@ impl Basis {
         Self::with_solver(patch, count, solve)
     }
 
-    /// The same with another symmetric eigen-solver: L (n × n) and `count` to eigenvalues (all n,
-    /// ascending) and at least `count` eigenvectors as columns. Tests prove with it that the basis does not
-    /// depend on the solver.
+    /// The same with another symmetric eigen-solver: L (n × n) and `count` to the `count` lowest eigenvalues,
+    /// ascending, and their eigenvectors as columns, with all that are equal to the last of them; further ones
+    /// do no harm. Tests prove with it that the basis does not depend on the solver.
     #[doc(hidden)]
     pub fn with_solver(
         patch: &Patch,
         count: usize,
-        solver: impl Fn(Mat<f64>, &dyn Fn(&[f64]) -> usize) -> Option<(Vec<f64>, Mat<f64>)>,
+        solver: impl Fn(Mat<f64>, usize) -> Option<(Vec<f64>, Mat<f64>)>,
     ) -> Result<Self> {
         let n = patch.vertices.len();
         let (laplacian, degrees) = symmetric_laplacian(patch);
-        let whole = |values: &[f64]| end_of_group(values, count);
-        let (values, mut vectors) = solver(laplacian, &whole).ok_or(Error::NoConvergence { vertices: n })?;
-        canonicalise(&values[..whole(&values)], &mut vectors);
-        let mut vectors = vectors.subcols(0, count).to_owned();
-        let norms_squared = (0..count).map(|i| to_unit_columns(&mut vectors, i, &degrees)).collect();
+        let (values, mut vectors) = solver(laplacian, count).ok_or(Error::NoConvergence { vertices: n })?;
+        canonicalise(&values[..end_of_group(&values, count)], &mut vectors);
+        vectors.truncate(n, count);
+        let norms_squared = to_unit_columns(&mut vectors, &degrees);
         Ok(Basis { vectors, eigenvalues: values[..count].to_vec(), degrees, norms_squared })
     }
 
@@ -93,50 +92,32 @@ fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
     (laplacian, degrees)
 }
 
-/// All eigenvalues and the first `columns(eigenvalues)` eigenvectors of a symmetric matrix:
-/// tridiagonalise, divide and conquer, transform back only the columns asked for. One thread, so
-/// that the result does not depend on how many there are.
-fn solve(mut matrix: Mat<f64>, columns: &dyn Fn(&[f64]) -> usize) -> Option<(Vec<f64>, Mat<f64>)> {
+/// The lowest eigenvalues and eigenvectors of a symmetric matrix, as [`Basis::with_solver`] needs them:
+/// tridiagonalise, solve that, transform back only the columns there are. One thread, so that the result
+/// does not depend on how many there are.
+fn solve(mut matrix: Mat<f64>, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = matrix.nrows();
     let block = qr::no_pivoting::factor::recommended_block_size::<f64>(n, n);
-    let mut params = <SelfAdjointEvdParams as Auto<f64>>::auto();
-    params.recursion_threshold = 32;
+    let params: Spec<TridiagParams, f64> = <TridiagParams as Auto<f64>>::auto().into();
     let scratch = StackReq::any_of(&[
-        tridiag::tridiag_in_place_scratch::<f64>(n, Par::Seq, params.tridiag.into()),
-        evd::self_adjoint_evd_scratch::<f64>(n, evd::ComputeEigenvectors::Yes, Par::Seq, params.into()),
+        tridiag::tridiag_in_place_scratch::<f64>(n, Par::Seq, params),
+        householder::apply_block_householder_sequence_on_the_left_in_place_scratch::<f64>(n - 1, block, n),
     ]);
     let mut memory = MemBuffer::new(scratch);
+    let memory = MemStack::new(&mut memory);
     let mut reflectors = Mat::zeros(block, n - 1);
-    tridiag::tridiag_in_place(
-        matrix.as_mut(),
-        reflectors.as_mut(),
-        Par::Seq,
-        MemStack::new(&mut memory),
-        params.tridiag.into(),
-    );
-    let diagonal: faer::Col<f64> = (0..n).map(|i| matrix[(i, i)]).collect();
-    let below: faer::Col<f64> = (0..n - 1).map(|i| matrix[(i + 1, i)]).collect();
-    let mut values = faer::Col::zeros(n);
-    let mut vectors = Mat::zeros(n, n);
-    evd::tridiagonal_self_adjoint_evd(
-        diagonal.as_ref().as_diagonal(),
-        below.as_ref().as_diagonal(),
-        values.as_mut().as_diagonal_mut(),
-        Some(vectors.as_mut()),
-        Par::Seq,
-        MemStack::new(&mut memory),
-        params.into(),
-    )
-    .ok()?;
-    let values: Vec<f64> = values.iter().copied().collect();
-    let count = columns(&values);
+    tridiag::tridiag_in_place(matrix.as_mut(), reflectors.as_mut(), Par::Seq, memory, params);
+    let diagonal = (0..n).map(|i| matrix[(i, i)]).collect();
+    let below = (0..n - 1).map(|i| matrix[(i + 1, i)]).collect();
+    let (values, mut vectors) = Tridiagonal::new(diagonal, below).lowest(count, EQUAL_EIGENVALUES)?;
+    vectors.truncate(n, end_of_group(&values, count));
     householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
         matrix.submatrix(1, 0, n - 1, n - 1),
         reflectors.as_ref(),
         Conj::No,
-        vectors.as_mut().subcols_mut(0, count).subrows_mut(1, n - 1),
+        vectors.as_mut().subrows_mut(1, n - 1),
         Par::Seq,
-        MemStack::new(&mut memory),
+        memory,
     );
     Some((values, vectors))
 }
@@ -152,9 +133,16 @@ fn canonicalise(values: &[f64], vectors: &mut Mat<f64>) {
     let mut start = 0;
     while start < values.len() {
         let end = end_of_group(values, start + 1);
-        let group = vectors.as_ref().subcols(start, end - start);
-        let rotated = group * canonical_rotation(group, probes.columns(end - start));
-        vectors.as_mut().subcols_mut(start, end - start).copy_from(rotated);
+        let probes = probes.columns(end - start);
+        if end - start == 1 {
+            let column = vectors.col_as_slice_mut(start);
+            let seen: f64 = column.iter().zip(probes.col(0).iter()).map(|(u, f)| u * f).sum();
+            column.iter_mut().for_each(|u| *u *= seen.signum());
+        } else {
+            let group = vectors.as_ref().subcols(start, end - start);
+            let rotated = group * canonical_rotation(group, probes);
+            vectors.as_mut().subcols_mut(start, end - start).copy_from(rotated);
+        }
         start = end;
     }
 }
@@ -200,15 +188,17 @@ impl Probes {
     }
 }
 
-/// Turns column i from u_i into e_i = D^−½ u_i / |D^−½ u_i| and returns |D^−½ u_i|².
-fn to_unit_columns(vectors: &mut Mat<f64>, i: usize, degrees: &[f64]) -> f64 {
-    let mut norm2 = 0.0;
-    for (v, degree) in degrees.iter().enumerate() {
-        vectors[(v, i)] /= degree.sqrt();
-        norm2 += vectors[(v, i)].powi(2);
-    }
-    for v in 0..degrees.len() {
-        vectors[(v, i)] /= norm2.sqrt();
-    }
-    norm2
+/// Turns every column from u_i into e_i = D^−½ u_i / |D^−½ u_i| and returns |D^−½ u_i|².
+fn to_unit_columns(vectors: &mut Mat<f64>, degrees: &[f64]) -> Vec<f64> {
+    let count = vectors.ncols();
+    let factors: Vec<f64> = degrees.iter().map(|degree| 1.0 / degree.sqrt()).collect();
+    let to_unit = |i: usize| {
+        let column = vectors.col_as_slice_mut(i);
+        column.iter_mut().zip(&factors).for_each(|(u, factor)| *u *= factor);
+        let norm2: f64 = column.iter().map(|w| w * w).sum();
+        let scale = 1.0 / norm2.sqrt();
+        column.iter_mut().for_each(|w| *w *= scale);
+        norm2
+    };
+    (0..count).map(to_unit).collect()
 }
