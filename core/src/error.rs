@@ -1,73 +1,157 @@
-use crate::code::Code;
+use crate::{
+    code::Code,
+    options::{Kind, OPTIONS, PATCH_SIZE_RANGE, Spelling},
+};
+use std::fmt;
 
 /// What can go wrong in the algorithm. Every message says what would have been legal.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
-    #[error("vertex {index} has the coordinates ({x}, {y}): every coordinate must be a finite number")]
     NotFinite { index: usize, x: f64, y: f64 },
-    #[error("the coordinates span {span:e} units: more than the 1e30 a mesh can be built on")]
     TooWide { span: f64 },
-    #[error("the map has no vertices: give one with geometry")]
     NoVertices,
-    #[error(
-        "the map has {vertices} distinct vertices, fewer than PATCH_SIZE={patch_size}: {}",
-        patch_size_hint(*.vertices)
-    )]
     TooFewVertices { vertices: usize, patch_size: usize },
-    #[error(
-        "all {vertices} distinct vertices lie on one straight line, so they have no mesh: \
-         mark a map whose vertices spread over an area"
-    )]
     Collinear { vertices: usize },
-    #[error(
-        "a message of {bits} bits with {}CHIP_RATE={chip_rate} needs {} coefficients, but the smallest patch \
-         ({vertices} vertices) has {}: use {}",
-        if *.code == Code::Ldpc { "CODE=LDPC and " } else { "" },
-        .code.expansion() * .bits * .chip_rate, .vertices - 1, what_fits(*.code, *.bits, *.vertices)
-    )]
     TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize },
-    #[error(
-        "CODE=LDPC carries a message of exactly 128 bits, not {bits}: use 32 hexadecimal digits, a RECIPIENT, \
-         or CODE=REPETITION"
-    )]
     CodeLength { bits: usize },
-    #[error(
-        "PRECISION={precision} is {metres} m on the ground here, more than TOLERANCE={tolerance_m} m: \
-         use a finer PRECISION or a larger TOLERANCE"
-    )]
     PrecisionTooCoarse { precision: f64, metres: f64, tolerance_m: f64 },
-    #[error(
-        "after marking, {errors} of the {bits} message bits cannot be read back: \
-         raise AMPLITUDE or CHIP_RATE, lower PATCH_SIZE, or use a finer PRECISION or a larger TOLERANCE"
-    )]
     MessageLost { errors: usize, bits: usize },
-    #[error("the eigenvalues of a patch of {vertices} vertices did not converge: change PATCH_SIZE slightly")]
     NoConvergence { vertices: usize },
-    #[error("message \"{0}\" is not 2 to 256 hexadecimal digits (0-9, a-f)")]
     Message(String),
-    #[error("malformed key: {0}; a key file is what `meshmark keygen` writes")]
     Key(String),
-    #[error("malformed record: {0}; a record is what the driver writes to RECORD=")]
     Record(String),
-    #[error("{0}")]
-    Option(String),
+    UnknownOption(String),
+    RepeatedOption(&'static str),
+    EmptyOption(&'static str),
+    EmptyName { option: &'static str, value: String },
+    IllegalValue { option: &'static str, value: String, kind: Kind },
+    BothSubjects,
 }
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-fn what_fits(code: Code, bits: usize, vertices: usize) -> String {
-    let most = (vertices - 1) / (code.expansion() * bits);
-    let chip_rate = if most > 0 { format!("CHIP_RATE={most} or less, ") } else { String::new() };
-    let message = if code == Code::Ldpc { "CODE=REPETITION" } else { "a shorter message" };
-    format!("{chip_rate}{message} or a larger PATCH_SIZE")
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.text(Spelling::OpenOption))
+    }
 }
 
-fn patch_size_hint(vertices: usize) -> String {
-    let smallest = crate::options::PATCH_SIZE_RANGE.0;
-    if vertices < smallest {
-        return format!("a map needs at least {smallest} vertices to carry a mark");
+impl std::error::Error for Error {}
+
+impl Error {
+    /// The message, in which options are named as the user of this front end writes them.
+    pub fn text(&self, spelling: Spelling) -> String {
+        let name = |option| spelling.name(option);
+        match self {
+            Error::NotFinite { index, x, y } => {
+                format!(
+                    "vertex {index} has the coordinates ({x}, {y}): every coordinate must be a finite number"
+                )
+            }
+            Error::TooWide { span } => {
+                format!("the coordinates span {span:e} units: more than the 1e30 a mesh can be built on")
+            }
+            Error::NoVertices => "the map has no vertices: give one with geometry".into(),
+            Error::TooFewVertices { vertices, patch_size } => too_few(*vertices, *patch_size, spelling),
+            Error::Collinear { vertices } => format!(
+                "all {vertices} distinct vertices lie on one straight line, so they have no mesh: mark a map whose \
+                 vertices spread over an area"
+            ),
+            Error::TooManyCoefficients { code, bits, chip_rate, vertices } => {
+                too_many(*code, *bits, *chip_rate, *vertices, spelling)
+            }
+            Error::CodeLength { bits } => format!(
+                "{} carries a message of exactly 128 bits, not {bits}: use 32 hexadecimal digits, a {}, or {}",
+                spelling.value("CODE", "LDPC"),
+                name("RECIPIENT"),
+                spelling.value("CODE", "REPETITION")
+            ),
+            Error::PrecisionTooCoarse { precision, metres, tolerance_m } => format!(
+                "{} is {metres} m on the ground here, more than {} m: use a finer {} or a larger {}",
+                spelling.value("PRECISION", precision),
+                spelling.value("TOLERANCE", tolerance_m),
+                name("PRECISION"),
+                name("TOLERANCE")
+            ),
+            Error::MessageLost { errors, bits } => format!(
+                "after marking, {errors} of the {bits} message bits cannot be read back: raise {} or {}, lower {}, or \
+                 use a finer {} or a larger {}",
+                name("AMPLITUDE"),
+                name("CHIP_RATE"),
+                name("PATCH_SIZE"),
+                name("PRECISION"),
+                name("TOLERANCE")
+            ),
+            Error::NoConvergence { vertices } => format!(
+                "the eigenvalues of a patch of {vertices} vertices did not converge: change {} slightly",
+                name("PATCH_SIZE")
+            ),
+            Error::Message(text) => {
+                format!("message \"{text}\" is not 2 to 256 hexadecimal digits (0-9, a-f)")
+            }
+            Error::Key(reason) => {
+                format!("malformed key: {reason}; a key file is what `meshmark keygen` writes")
+            }
+            Error::Record(reason) => {
+                format!("malformed record: {reason}; a record is what the driver writes to RECORD=")
+            }
+            Error::UnknownOption(option) => {
+                let known: Vec<_> = OPTIONS.iter().map(|o| name(o.name)).collect();
+                format!("unknown option {option}: use {}", known.join(", "))
+            }
+            Error::RepeatedOption(option) => format!("{} is given twice: give it once", name(option)),
+            Error::EmptyOption(option) => {
+                format!("{} is empty: give it a value or leave it out", name(option))
+            }
+            Error::EmptyName { option, value } => {
+                format!("{} has an empty name between its commas", spelling.value(option, value))
+            }
+            Error::IllegalValue { option, value, kind } => {
+                format!("{} is not {}", spelling.value(option, value), kind.legal())
+            }
+            Error::BothSubjects => {
+                format!("both {} and {} are given: give exactly one", name("RECIPIENT"), name("MESSAGE"))
+            }
+        }
     }
-    format!("PATCH_SIZE={vertices} or less fits (the message must fit too: bits x CHIP_RATE < PATCH_SIZE)")
+}
+
+fn too_few(vertices: usize, patch_size: usize, spelling: Spelling) -> String {
+    let least = PATCH_SIZE_RANGE.0;
+    if vertices < least {
+        return format!(
+            "the map has {vertices} distinct vertices, and needs at least {least} to carry a mark"
+        );
+    }
+    format!(
+        "the map has {vertices} distinct vertices, fewer than {}: {} or less fits (the message must fit too: its bits, \
+         twice as many with {}, times {} must be fewer than {})",
+        spelling.value("PATCH_SIZE", patch_size),
+        spelling.value("PATCH_SIZE", vertices),
+        spelling.value("CODE", "LDPC"),
+        spelling.name("CHIP_RATE"),
+        spelling.name("PATCH_SIZE")
+    )
+}
+
+fn too_many(code: Code, bits: usize, chip_rate: usize, vertices: usize, spelling: Spelling) -> String {
+    let (coded, shorter) = match code {
+        Code::Ldpc => (spelling.value("CODE", "LDPC") + " and ", spelling.value("CODE", "REPETITION")),
+        Code::Repetition => (String::new(), "a shorter message".into()),
+    };
+    let channel_bits = code.expansion() * bits;
+    let fewer = match (vertices - 1) / channel_bits {
+        0 => String::new(),
+        most => spelling.value("CHIP_RATE", most) + " or less, ",
+    };
+    format!(
+        "a message of {bits} bits with {coded}{} needs {} coefficients, but the smallest patch ({vertices} vertices) \
+         has {}: use {fewer}{shorter} or a larger {}",
+        spelling.value("CHIP_RATE", chip_rate),
+        channel_bits * chip_rate,
+        vertices - 1,
+        spelling.name("PATCH_SIZE")
+    )
 }

@@ -20,6 +20,46 @@ pub enum Kind {
     Choice(&'static [&'static str]),
 }
 
+impl Kind {
+    /// What a legal value is, to complete "… is not".
+    pub(crate) fn legal(&self) -> String {
+        match self {
+            Kind::Text => "a text".into(),
+            Kind::Number(above, most) => format!("a number greater than {above} and at most {most}"),
+            Kind::Integer(least, most) => format!("a whole number from {least} to {most}"),
+            Kind::Choice(words) => words.join(" or "),
+        }
+    }
+}
+
+/// How a front end writes options, so that a message names what its user typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spelling {
+    /// The driver: `PATCH_SIZE`, `PATCH_SIZE=480`.
+    OpenOption,
+    /// The command line: `--patch-size`, `--patch-size 480`.
+    Flag,
+}
+
+impl Spelling {
+    /// An option of this name in the table.
+    pub fn name(self, name: &str) -> String {
+        match self {
+            Spelling::OpenOption => name.into(),
+            Spelling::Flag => format!("--{}", name.to_lowercase().replace('_', "-")),
+        }
+    }
+
+    /// The option with a value.
+    pub fn value(self, name: &str, value: impl std::fmt::Display) -> String {
+        let between = match self {
+            Spelling::OpenOption => "=",
+            Spelling::Flag => " ",
+        };
+        format!("{}{between}{value}", self.name(name))
+    }
+}
+
 /// One row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct OptionSpec {
@@ -66,7 +106,7 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         true,
-        "The message itself, 2 to 256 hexadecimal digits, instead of RECIPIENT",
+        "The message itself, 2 to 256 hexadecimal digits, instead of a recipient",
     ),
     row(
         "AMPLITUDE",
@@ -87,7 +127,7 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Integer(1, 2048),
         None,
         true,
-        "Coefficients that carry each of those bits, per patch and axis; by default 2, with CODE=LDPC 1",
+        "Coefficients that carry each of those bits, per patch and axis; by default 2, with LDPC 1",
     ),
     row(
         "PATCH_SIZE",
@@ -195,8 +235,8 @@ impl Options {
     /// Parses name-value pairs; names in any case.
     ///
     /// # Errors
-    /// [`Error::Option`] for an unknown name, a name given twice, a value that is not what its row
-    /// says, or both RECIPIENT and MESSAGE; [`Error::Message`] for bad hexadecimal digits.
+    /// An unknown name, a name given twice, a value that is not what its row says, both RECIPIENT and
+    /// MESSAGE, bad hexadecimal digits.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(pairs)?;
         let precision = values.number("PRECISION")?;
@@ -231,11 +271,10 @@ impl<'a> Values<'a> {
         let mut values: Vec<(&OptionSpec, &str)> = Vec::new();
         for (name, value) in pairs {
             let Some(spec) = spec(name) else {
-                let known: Vec<_> = OPTIONS.iter().map(|o| o.name).collect();
-                return Err(Error::Option(format!("unknown option {name}: use {}", known.join(", "))));
+                return Err(Error::UnknownOption(name.into()));
             };
             if values.iter().any(|(s, _)| s.name == spec.name) {
-                return Err(Error::Option(format!("{} is given twice: give it once", spec.name)));
+                return Err(Error::RepeatedOption(spec.name));
             }
             values.push((spec, value));
         }
@@ -246,61 +285,55 @@ impl<'a> Values<'a> {
         self.0.iter().find(|(spec, _)| spec.name == name).map(|(_, value)| *value)
     }
 
-    fn text(&self, name: &str) -> Result<Option<String>> {
+    fn text(&self, name: &'static str) -> Result<Option<String>> {
         match self.given(name) {
-            Some(value) if value.trim().is_empty() => {
-                Err(Error::Option(format!("{name} is empty: give it a value or leave it out")))
-            }
+            Some(value) if value.trim().is_empty() => Err(Error::EmptyOption(name)),
             value => Ok(value.map(String::from)),
         }
     }
 
     fn subject(&self) -> Result<Option<Subject>> {
         match (self.text("RECIPIENT")?, self.text("MESSAGE")?) {
-            (Some(_), Some(_)) => {
-                Err(Error::Option("both RECIPIENT and MESSAGE are given: give exactly one".into()))
-            }
+            (Some(_), Some(_)) => Err(Error::BothSubjects),
             (Some(text), None) => Ok(Some(Subject::Recipient(text))),
             (None, Some(hex)) => Ok(Some(Subject::Message(Message::from_hex(&hex)?))),
             (None, None) => Ok(None),
         }
     }
 
-    fn list(&self, name: &str) -> Result<Option<Vec<String>>> {
-        let Some(text) = self.text(name)? else { return Ok(None) };
-        let names: Vec<String> = text.split(',').map(|n| n.trim().to_string()).collect();
+    fn list(&self, option: &'static str) -> Result<Option<Vec<String>>> {
+        let Some(value) = self.text(option)? else { return Ok(None) };
+        let names: Vec<String> = value.split(',').map(|n| n.trim().to_string()).collect();
         if names.iter().any(String::is_empty) {
-            return Err(Error::Option(format!("{name}={text} has an empty name between its commas")));
+            return Err(Error::EmptyName { option, value });
         }
         Ok(Some(names))
     }
 
     fn number(&self, name: &str) -> Result<Option<f64>> {
-        let spec = spec(name).expect("a row of the table");
-        let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
-        let Kind::Number(above, most) = spec.kind else { unreachable!("{name} is a number") };
-        match value.trim().parse::<f64>() {
-            Ok(number) if number > above && number <= most => Ok(Some(number)),
-            _ => Err(Error::Option(format!(
-                "{name}={value} is not a number greater than {above} and at most {most}"
-            ))),
-        }
+        self.parsed(name, |kind, text| {
+            let Kind::Number(above, most) = kind else { unreachable!("{name} is a number") };
+            text.parse().ok().filter(|number| *number > above && *number <= most)
+        })
     }
 
     fn integer(&self, name: &str) -> Result<Option<usize>> {
-        let spec = spec(name).expect("a row of the table");
-        let Kind::Integer(least, most) = spec.kind else { unreachable!("{name} is an integer") };
-        let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
-        match value.trim().parse::<usize>() {
-            Ok(number) if (least..=most).contains(&number) => Ok(Some(number)),
-            _ => Err(Error::Option(format!("{name}={value} is not a whole number from {least} to {most}"))),
-        }
+        self.parsed(name, |kind, text| {
+            let Kind::Integer(least, most) = kind else { unreachable!("{name} is an integer") };
+            text.parse().ok().filter(|number| (least..=most).contains(number))
+        })
     }
 
     fn code(&self) -> Result<Code> {
-        let name = self.given("CODE").or(spec("CODE").and_then(|row| row.default)).expect("has a default");
-        Code::from_name(name.trim())
-            .ok_or_else(|| Error::Option(format!("CODE={name} is unknown: use {}", Code::NAMES.join(" or "))))
+        Ok(self.parsed("CODE", |_, text| Code::from_name(text))?.expect("has a default"))
+    }
+
+    /// The value given, or the default, as `parse` understands it.
+    fn parsed<T>(&self, name: &str, parse: impl Fn(Kind, &str) -> Option<T>) -> Result<Option<T>> {
+        let spec = spec(name).expect("a row of the table");
+        let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
+        let illegal = || Error::IllegalValue { option: spec.name, value: value.into(), kind: spec.kind };
+        parse(spec.kind, value.trim()).ok_or_else(illegal).map(Some)
     }
 }
 
@@ -349,7 +382,7 @@ mod tests {
         assert_eq!((p.amplitude_m, p.chip_rate, p.patch_size), (0.10, 2, 480));
         assert_eq!((p.tolerance_m, p.precision, p.code), (0.75, None, Code::Repetition));
         let chip_rate = |pairs: &[_]| Options::parse(pairs.iter().copied()).unwrap().parameters.chip_rate;
-        assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 2, with CODE=LDPC 1"));
+        assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 2, with LDPC 1"));
         assert_eq!((chip_rate(&[]), chip_rate(&[("CODE", "LDPC")])), (2, 1));
         assert_eq!(chip_rate(&[("CODE", "ldpc"), ("CHIP_RATE", "3")]), 3);
     }
@@ -362,7 +395,7 @@ mod tests {
         assert!(error(&[("TOLERANCE", "inf")]).contains("at most 1000000"));
         assert!(error(&[("CHIP_RATE", "2.5")]).contains("whole number from 1"));
         assert!(error(&[("PATCH_SIZE", "3")]).contains("from 16 to 4096"));
-        assert!(error(&[("CODE", "morse")]).contains("CODE=morse is unknown: use REPETITION or LDPC"));
+        assert!(error(&[("CODE", "morse")]).contains("CODE=morse is not REPETITION or LDPC"));
         let short = error(&[("CODE", "LDPC"), ("MESSAGE", "0123456789abcdef")]);
         assert!(short.contains("exactly 128 bits, not 64: use 32 hexadecimal digits"), "{short}");
         assert!(error(&[("COLOUR", "red")]).contains("unknown option COLOUR: use KEY, "));
@@ -371,6 +404,21 @@ mod tests {
         assert!(error(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).contains("exactly one"));
         assert!(error(&[("MESSAGE", "xyz")]).contains("hexadecimal"));
         assert!(error(&[("LAYERS", "a,,b")]).contains("empty name"));
+    }
+
+    #[test]
+    fn a_message_names_options_as_its_reader_writes_them() {
+        let flags = |pairs: &[_]| Options::parse(pairs.iter().copied()).unwrap_err().text(Spelling::Flag);
+        assert_eq!(flags(&[("PATCH_SIZE", "3")]), "--patch-size 3 is not a whole number from 16 to 4096");
+        assert!(
+            flags(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).starts_with("both --recipient and --message")
+        );
+        let few = Error::TooFewVertices { vertices: 300, patch_size: 480 };
+        assert!(few.text(Spelling::Flag).contains("fewer than --patch-size 480: --patch-size 300 or less"));
+        assert!(few.to_string().contains("fewer than PATCH_SIZE=480: PATCH_SIZE=300 or less"));
+        assert!(few.to_string().contains("twice as many with CODE=LDPC"));
+        let fewer = Error::TooFewVertices { vertices: 3, patch_size: 480 }.to_string();
+        assert!(fewer.contains("at least 16") && !fewer.contains("480"), "{fewer}");
     }
 
     #[test]

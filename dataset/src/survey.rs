@@ -93,11 +93,11 @@ impl Survey {
 /// A layer that does not exist or cannot be read to its end, layers of different CRS, coordinates
 /// that are not finite, a CRS in which metres mean nothing.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
-    let names = layer_names(dataset, selection.layers)?;
+    let chosen = chosen_layers(dataset, selection.layers)?;
     let mut walk =
         Walk { selection, crs: None, chains: Chains::default(), labels: Vec::new(), shapes: Vec::new() };
-    for name in &names {
-        walk.layer(&mut dataset.layer_by_name(name)?, name)?;
+    for (index, name) in &chosen {
+        walk.layer(&mut dataset.layer(*index)?, name)?;
     }
     let crs = match selection.target {
         Target::Crs(target) => Some(target.clone()),
@@ -113,17 +113,17 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     Ok(Survey { vertices, segments, crs, ground, labels: walk.labels, shapes: walk.shapes })
 }
 
-/// The names of the chosen layers, in the dataset's order.
-fn layer_names(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<String>> {
+/// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
+fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
     let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
     if known.is_empty() {
         return Err(Error::NoLayers);
     }
-    let Some(wanted) = wanted else { return Ok(known) };
-    match wanted.iter().find(|name| !known.contains(name)) {
-        Some(name) => Err(Error::UnknownLayer { name: name.clone(), known: known.join(", ") }),
-        None => Ok(known.into_iter().filter(|name| wanted.contains(name)).collect()),
+    if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
+        return Err(Error::UnknownLayer { name: name.clone(), known: known.join(", ") });
     }
+    let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
+    Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())
 }
 
 /// Coordinates of rings, lines and points, one after the other.
@@ -320,6 +320,10 @@ fn reproject(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gdal::{
+        DriverManager,
+        vector::{Geometry, LayerOptions, OGRwkbGeometryType},
+    };
 
     #[test]
     fn segments_join_neighbours_of_a_chain_once_and_no_vertex_with_itself() {
@@ -327,5 +331,30 @@ mod tests {
         let indices = [0, 1, 2, 0, 2, 1, 1, 3, 4];
         assert_eq!(segments(&indices, &[0, 4, 8]), [[0, 1], [0, 2], [1, 2], [1, 3]]);
         assert_eq!(segments(&[], &[]), Vec::<[u32; 2]>::new());
+    }
+
+    #[test]
+    fn two_layers_of_one_name_are_both_read() {
+        let mut dataset =
+            DriverManager::get_driver_by_name("Memory").unwrap().create_vector_only("").unwrap();
+        for place in ["POINT (1000 1)", "POINT (2000 2)"] {
+            let ty = OGRwkbGeometryType::wkbPoint;
+            let options = LayerOptions { name: "roads", ty, ..Default::default() };
+            let mut layer = dataset.create_layer(options).unwrap();
+            layer.create_feature(Geometry::from_wkt(place).unwrap()).unwrap();
+        }
+        let layers = ["roads".to_string()];
+        for layers in [None, Some(&layers[..])] {
+            let selection = Selection {
+                layers,
+                srs: None,
+                labels: LabelFields::None,
+                target: Target::Own,
+                most_vertices: 10,
+                last_failure: &|| None,
+            };
+            let map = survey(&dataset, &selection).unwrap();
+            assert_eq!(map.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
+        }
     }
 }

@@ -1,3 +1,5 @@
+use meshmark_core::options::Spelling;
+
 /// What ends a command early. Every message names the input and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -45,9 +47,9 @@ impl Error {
     }
 }
 
-/// An error of the algorithm is one of its parameters.
+/// An error of the algorithm is one of its parameters, which are flags here.
 impl From<meshmark_core::Error> for Error {
     fn from(error: meshmark_core::Error) -> Self {
-        Error::Usage(error.to_string())
+        Error::Usage(error.text(Spelling::Flag))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
-use meshmark_core::{key::SecretKey, record::Record};
+use meshmark_core::{key::SecretKey, options::Spelling, record::Record};
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
 use std::{
     collections::BTreeSet,
@@ -241,7 +241,7 @@ fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: T
         last_failure: &|| last_failure().clone(),
     };
     survey(dataset, &selection).map_err(|error| {
-        let text = format!("the {what} {}: {error}", path.display());
+        let text = format!("the {what} {}: {}", path.display(), error.text(Spelling::Flag));
         match error {
             meshmark_dataset::Error::TooLarge { .. } => Error::TooLarge(text),
             meshmark_dataset::Error::UnknownLayer { .. }
