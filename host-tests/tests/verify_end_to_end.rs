@@ -1,7 +1,7 @@
 //! Mark with `ogr2ogr`, do to the file what people do, verify with `meshmark verify`.
 
 use meshmark_host_tests::{
-    attacks::{Map, features, similarity},
+    attacks::{Map, deformation, features, similarity},
     plugin::{Host, Run, library},
 };
 use serde_json::Value;
@@ -135,6 +135,33 @@ fn a_translated_rotated_scaled_copy_is_found_by_its_landmarks() {
         assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
         assert!(report["registration"]["rms_m"].as_f64().unwrap() < 0.12);
     }
+}
+
+#[test]
+fn landmarks_are_fields_of_the_reference_and_match_any_field_of_the_suspect_by_value() {
+    let host = marked("helsinki.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    similarity::translate(&map, [1000.0, -500.0]).write(&host.path("moved.gpkg")).unwrap();
+    let renamed = "SELECT osm_id AS objectnumber FROM buildings"; // and then cut to ten characters
+    host.run("ogr2ogr", &["renamed.shp", "moved.gpkg", "-dialect", "OGRSQL", "-sql", renamed]).succeeds();
+    let more =
+        ["--landmark", "osm_id", "--registration", "landmarks", "--record", "acme.json", "renamed.shp"];
+    let report = matches(&host, "map.gpkg", &more);
+    assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
+}
+
+#[test]
+fn the_paper_counts_only_the_vertices_within_the_radius() {
+    let host = marked("helsinki.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    let bent = deformation::deform(&map, deformation::Cell::Share(4), 1.0, deformation::Side::Cell).unwrap();
+    bent.write(&host.path("bent.gpkg")).unwrap();
+    let matched = |demodulator: &str| {
+        let how = ["--record", "acme.json", "--demodulator", demodulator, "bent.gpkg"];
+        verify(&host, "map.gpkg", &how).1["vertices"]["matched"].as_u64().unwrap()
+    };
+    let (paper, joint) = (matched("paper"), matched("joint"));
+    assert!(0 < paper && paper < joint, "{paper} {joint}: the joint demodulator follows the deformation");
 }
 
 #[test]

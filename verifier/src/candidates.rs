@@ -273,13 +273,16 @@ fn overall(outcomes: &[Outcome]) -> Decision {
             Decision { verdict: Verdict::Inconclusive, reason, ..best }
         }
         (0, None) => Decision {
-            reason: "a mark with this key and any of these messages would have shown, and none does".into(),
+            reason: "a mark with this key, this reference and the message and options of any of these records would \
+                     have shown, and none does"
+                .into(),
             ..best
         },
         (1, _) => best,
         _ => Decision {
             reason: format!(
-                "the evidence for this key and {matches} of the records is below the significance"
+                "for {matches} of the records the probability that key and message fit so well by chance is below the \
+                 significance"
             ),
             ..best
         },

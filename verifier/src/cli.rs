@@ -4,7 +4,7 @@ use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand};
 use meshmark_core::{
     key::SecretKey,
     message::Message,
-    options::{OPTIONS, Options, Subject},
+    options::{OPTIONS, Options, Spelling, Subject},
     record::Record,
 };
 use meshmark_verifier::{
@@ -13,9 +13,13 @@ use meshmark_verifier::{
 };
 use std::{io::Write, path::PathBuf};
 
+const MARKING: &str = "Maps are marked by GDAL's ogr2ogr: ogr2ogr -f GPKG marked.gpkg MESHMARK:map.gpkg \
+                       -oo KEY=key.json -oo RECIPIENT=\"ACME GmbH\" -oo RECORD=acme.json";
+
 /// Watermarks of vector maps: make a key, verify a suspect map.
 #[derive(Parser)]
-#[command(name = "meshmark", version, subcommand_required = true, arg_required_else_help = true)]
+#[command(name = "meshmark", version, subcommand_required = true, arg_required_else_help = true,
+          after_help = MARKING)]
 struct Cli {
     #[command(subcommand)]
     command: Subcommands,
@@ -51,7 +55,8 @@ struct VerifyArgs {
     records: Option<PathBuf>,
     /// The map in question
     suspect: PathBuf,
-    /// Attribute field to find landmarks by; repeatable, all string and integer fields by default
+    /// Field of the reference to find landmarks by, matched with any field of the suspect by value; repeatable,
+    /// all string and integer fields by default
     #[arg(long, value_name = "FIELD")]
     landmark: Vec<String>,
     /// How to bring the suspect onto the reference
@@ -61,10 +66,10 @@ struct VerifyArgs {
     #[arg(long, value_enum, default_value = "joint")]
     demodulator: Demodulator,
     /// Radius within which vertices match, metres on the ground
-    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = positive, allow_negative_numbers = true)]
     radius: f64,
     /// The verdict is match when the p-value is below this
-    #[arg(long, value_name = "P", default_value_t = 1e-6, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = 1e-6, value_parser = probability, allow_negative_numbers = true)]
     significance: f64,
     /// Print the report as one JSON object
     #[arg(long)]
@@ -84,7 +89,7 @@ impl Args for MarkingFlags {
         let flags = OPTIONS.iter().filter(|option| option.shapes_mark).map(|option| {
             let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
             Arg::new(option.name)
-                .long(option.name.to_lowercase().replace('_', "-"))
+                .long(Spelling::Flag.name(option.name)[2..].to_string())
                 .value_name(option.name)
                 .allow_negative_numbers(true)
                 .conflicts_with("records")
@@ -250,10 +255,8 @@ fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> 
             other => unreachable!("{other} does not shape the mark"),
         };
         if !agrees {
-            let flag = name.to_lowercase().replace('_', "-");
-            return Err(Error::Usage(format!(
-                "--{flag} {value} contradicts the record: leave one of them out"
-            )));
+            let flag = Spelling::Flag.value(name, value);
+            return Err(Error::Usage(format!("{flag} contradicts the record: leave one of them out")));
         }
     }
     Ok(())

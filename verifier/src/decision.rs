@@ -19,6 +19,9 @@ use serde::Serialize;
 /// significance needs.
 const POWER_MARGIN: f64 = 3.0;
 
+/// What a verdict is about: under any other of these the mark is another one.
+const MARK: &str = "a mark with this key, message, options and reference";
+
 /// The answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -72,7 +75,7 @@ pub fn decide(found: &Demodulation, expected: Option<&Message>, significance: f6
 
 /// Weighs a demodulation against one of the messages that are tried.
 pub fn decide_among(found: &Demodulation, message: &Message, tried: usize, significance: f64) -> Decision {
-    let significance = significance / tried as f64; // Bonferroni
+    let each = significance / tried as f64; // Bonferroni
     let bits = message.len();
     let p_mark = survival::normal_log10(found.mark_score(message));
     // A message of m bits cannot be hit less often than once in 2^m.
@@ -83,12 +86,16 @@ pub fn decide_among(found: &Demodulation, message: &Message, tried: usize, signi
             "a message of {bits} bits cannot identify anyone: mark with {LEAST_IDENTIFYING_BITS} or more"
         );
         (Verdict::Inconclusive, reason)
-    } else if p_mark.max(p_recipient) < significance.log10() {
-        (Verdict::Match, "the evidence for this key and this message is below the significance".into())
-    } else if would_show(found, significance) {
-        (Verdict::NoMatch, "a mark with this key and message would have shown, and it does not".into())
+    } else if p_mark.max(p_recipient) < each.log10() {
+        let reason = format!(
+            "the probability that this key and message fit so well by chance is below the significance of \
+             {significance:e}"
+        );
+        (Verdict::Match, reason)
+    } else if would_show(found, each) {
+        (Verdict::NoMatch, format!("{MARK} would have shown, and it does not"))
     } else {
-        (Verdict::Inconclusive, "too little of the map was matched for a mark to show".into())
+        (Verdict::Inconclusive, format!("too few vertices match, or too roughly, for {MARK} to show"))
     };
     Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient), tried }
 }

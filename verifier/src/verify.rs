@@ -18,7 +18,7 @@ use meshmark_core::{
     ground::Ground,
     key::SecretKey,
     message::Message,
-    options::Parameters,
+    options::{Parameters, Spelling},
     patches::Patches,
     record::Record,
 };
@@ -57,7 +57,7 @@ pub struct Request {
     pub layers: Option<Vec<String>>,
     /// CRS of the reference when it has none.
     pub srs: Option<String>,
-    /// Attributes to use as landmarks; all when empty.
+    /// Fields of the reference to use as landmarks; all when empty. Those of the suspect may have other names.
     pub landmarks: Vec<String>,
     /// Where to start the registration.
     pub registration: Start,
@@ -128,16 +128,16 @@ pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Surv
 /// # Errors
 /// An unreadable suspect, parameters that do not fit the reference.
 pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Examination> {
-    let ground = reference
-        .ground()
-        .map_err(|error| Error::Usage(format!("the reference {}: {error}", request.reference.display())))?;
+    let ground = reference.ground().map_err(|error| of_reference(request, error))?;
     progress.start("reading", 0);
-    let plain = Reading { layers: None, srs: None, landmarks: request.landmarks() };
+    let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All };
     let (suspect, suspect_crs) = reading::suspect(&request.suspect, &plain, reference)?;
 
     progress.start("patches", 0);
-    let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size)?;
-    patches.carriers(request.bits, &request.parameters)?; // before the map is searched for
+    let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size);
+    let patches = patches.map_err(|error| of_reference(request, error))?;
+    let carriers = patches.carriers(request.bits, &request.parameters); // before the map is searched for
+    carriers.map_err(|error| of_reference(request, error))?;
 
     progress.start("registration", 0);
     let (radius_m, start) = (request.radius_m, request.registration);
@@ -149,60 +149,72 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     let matches = matcher.all(&moved, request.radius_m);
     let chance = by_chance(&matcher, &moved, &ground, reference.vertices.centre(), request.radius_m);
 
+    let vertices = VertexCounts {
+        reference: reference.vertices.len(),
+        suspect: suspect.vertices.len(),
+        matched: matches.count,
+    };
     let mut seen = Examination {
         registration,
-        vertices: VertexCounts {
-            reference: reference.vertices.len(),
-            suspect: suspect.vertices.len(),
-            matched: matches.count,
-        },
+        vertices,
         reference_digest: reference.vertices.digest(),
         crs: reference.crs.as_ref().map(|crs| crs.label()),
         suspect_crs,
-        found: Err(unregistered(matches.count, reference.vertices.len(), chance)),
+        found: Err(unregistered(&vertices, chance)),
         decoys: None,
     };
     if matches.count >= LEAST_MATCHED && matches.count >= 2 * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
         let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
-        let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress)?;
+        let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress);
+        let found = found.map_err(|error| of_reference(request, error))?;
         seen.decoys = Decoys::new(&found, &suspect.vertices, &reference.vertices);
         seen.found = Ok(found);
     }
     Ok(seen)
 }
 
-fn unregistered(matched: usize, reference: usize, chance: usize) -> String {
+/// What does not fit the reference: its options are flags here.
+fn of_reference(request: &Request, error: impl Into<meshmark_dataset::Error>) -> Error {
+    Error::Usage(format!(
+        "the reference {}: {}",
+        request.reference.display(),
+        error.into().text(Spelling::Flag)
+    ))
+}
+
+fn unregistered(vertices: &VertexCounts, chance: usize) -> String {
+    if vertices.suspect == 0 {
+        return "the suspect has no vertices, so there is nothing to compare".into();
+    }
     format!(
-        "{matched} of {reference} reference vertices match, no more than by chance ({chance}): the suspect was not \
-         registered"
+        "only {} of {} reference vertices match, and {chance} do by chance: the suspect is another map, or could not \
+         be brought onto the reference",
+        vertices.matched, vertices.reference
     )
 }
 
+/// The paper's demodulator takes the matches as they are; the joint one follows a deformation first.
 fn demodulate(
     request: &Request,
     tracking: &Tracking,
     matches: &Matches,
     vertices: &mut VertexCounts,
     progress: &mut Progress,
-) -> Result<Demodulation> {
-    progress.start("deformation", 0);
+) -> meshmark_core::Result<Demodulation> {
     let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
+    let (carrier, steps) = (Carrier::new(&request.key), patches.as_slice().len() as u64);
+    if request.demodulator == Demodulator::Paper {
+        progress.start("demodulation", steps);
+        let matched = tracking.displacements(matches);
+        return demodulation::paper(patches, &carrier, &matched, bits, parameters, &progress.stepper());
+    }
+    progress.start("deformation", 0);
     let carriers = patches.carriers(bits, parameters)?;
     let (observed, disturbance) = tracking.follow(carriers, request)?;
     vertices.matched = observed.iter().flatten().count();
-
-    progress.start("demodulation", patches.as_slice().len() as u64);
-    let (carrier, step) = (Carrier::new(&request.key), progress.stepper());
-    Ok(match request.demodulator {
-        Demodulator::Paper => {
-            let matched = tracking.displacements(matches);
-            demodulation::paper(patches, &carrier, &matched, bits, parameters, &step)?
-        }
-        Demodulator::Joint => {
-            demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?
-        }
-    })
+    progress.start("demodulation", steps);
+    demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &progress.stepper())
 }
 
 fn side(survey: &Survey) -> Side<'_> {
@@ -275,7 +287,11 @@ struct Tracking<'a> {
 }
 
 impl Tracking<'_> {
-    fn follow(&self, carriers: usize, request: &Request) -> Result<(Vec<Option<[f64; 2]>>, Prediction)> {
+    fn follow(
+        &self,
+        carriers: usize,
+        request: &Request,
+    ) -> meshmark_core::Result<(Vec<Option<[f64; 2]>>, Prediction)> {
         let coords = self.reference.vertices.coords();
         let mut observed = self.displacements(&self.match_joined(coords, request.radius_m));
         let mut round = 1;

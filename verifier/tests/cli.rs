@@ -54,6 +54,9 @@ fn make_files(folder: &Path) {
     write("record_with_a_comment.json", record.replacen("{", "{ \"comment\": \"\",", 1).as_bytes());
     make_records(folder, &record);
     write("text.txt", b"This is no map.\n");
+    write("table.csv", b"name,height\nTown hall,20\n");
+    write("small.csv", b"id,WKT\n1,\"LINESTRING (385000 6672000,385010 6672000,385010 6672020)\"\n");
+    write("degrees.csv", b"id,WKT\n1,\"LINESTRING (24.9 60.1,24.91 60.1,24.92 60.2)\"\n");
     write("truncated.gpkg", &fs::read(folder.join("marked.gpkg")).unwrap()[..100_000]);
     write(
         "marked.vrt",
