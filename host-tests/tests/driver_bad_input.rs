@@ -272,6 +272,15 @@ fn a_record_is_neither_the_key_nor_the_source_by_any_name() {
 }
 
 #[test]
+fn a_record_is_not_the_output_by_any_name() {
+    let host = Host::new();
+    for name in ["out.gpkg", "./out.gpkg"] {
+        let option = format!("RECORD={name}");
+        refuses_map(&host, &map(), &["-oo", &option], &[&option, "same file as the output"]);
+    }
+}
+
+#[test]
 fn a_record_needs_a_folder_that_can_be_written() {
     let host = Host::new();
     refuses_map(

@@ -423,6 +423,18 @@ fn the_key_may_come_from_the_configuration() {
 }
 
 #[test]
+fn an_amplitude_far_above_the_tolerance_is_marked_with_one_warning() {
+    let host = Host::new();
+    let said = |amplitude: &str| {
+        let options = ["-oo", amplitude];
+        host.mark("GPKG", "marked.gpkg", &source("kotka.gpkg"), &options).succeeds().warnings().concat()
+    };
+    assert_eq!(said("AMPLITUDE=0.6"), "");
+    let said = said("AMPLITUDE=6");
+    assert!(said.contains("AMPLITUDE=6 would move") && said.contains("TOLERANCE=0.75"), "{said}");
+}
+
+#[test]
 fn a_map_without_crs_is_marked_in_metres_with_one_warning() {
     let host = Host::new();
     host.run("ogr2ogr", &["-f", "ESRI Shapefile", "bare.shp", &source("kotka.gpkg"), "buildings"]).succeeds();

@@ -49,7 +49,7 @@ pub enum Error {
     #[error("neither RECIPIENT nor MESSAGE is given: give exactly one")]
     NoSubject,
     #[error("RECORD={path} is the same file as the {what}: give the record a file of its own")]
-    RecordIsInput { path: String, what: &'static str },
+    RecordIsOther { path: String, what: &'static str },
     #[error("RECORD={path} is there already and says something else: move it away, or give another name")]
     RecordDiffers { path: String },
     #[error(

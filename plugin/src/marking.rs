@@ -9,8 +9,8 @@ use gdal::Dataset;
 use meshmark_core::{
     embedding::{self, Marked},
     key::SecretKey,
-    message::LEAST_IDENTIFYING_BITS,
-    options::{Options, Subject},
+    message::{LEAST_IDENTIFYING_BITS, Message},
+    options::{Options, Parameters, Subject},
     record::{self, Record, Reference},
     vertices::VertexTable,
 };
@@ -50,9 +50,10 @@ impl Request {
         let key_path = options.key_path.clone().or(default_key_path).ok_or(Error::NoKey)?;
         let key = read_key(&key_path)?;
         if let Some(record) = &options.record_path {
+            output::check_is_not_record(record)?;
             record_file::check_folder(Path::new(record))?;
             if same_file(Path::new(record), Path::new(&key_path)) {
-                return Err(Error::RecordIsInput { path: record.clone(), what: "key" });
+                return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
         Ok(Request { options, subject, key })
@@ -109,19 +110,7 @@ impl Marking {
         if let Some(path) = &options.record_path {
             record_file::write(Path::new(path), &record(request, &map, &marked).to_json())?;
         }
-        let mut warnings = Vec::new();
-        if map.crs.is_none() {
-            let text = "the source has no CRS: its units are taken as metres; say SRS=... if they are not";
-            warnings.push(text.into());
-        }
-        if message.len() < LEAST_IDENTIFYING_BITS {
-            warnings.push(format!(
-                "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
-                 hexadecimal digits or more",
-                message.len(),
-                LEAST_IDENTIFYING_BITS / 4
-            ));
-        }
+        let warnings = warnings(&options.parameters, &message, &map, &marked);
         Ok(Marking {
             name: source.name,
             table: map.vertices,
@@ -190,10 +179,38 @@ fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<Stri
 fn check_record_is_no_source(options: &Options, files: &SourceFiles) -> Result<()> {
     match &options.record_path {
         Some(path) if files.contain(Path::new(path)) => {
-            Err(Error::RecordIsInput { path: path.clone(), what: "source" })
+            Err(Error::RecordIsOther { path: path.clone(), what: "source" })
         }
         _ => Ok(()),
     }
+}
+
+/// What is legal and probably not meant.
+fn warnings(parameters: &Parameters, message: &Message, map: &Survey, marked: &Marked) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if map.crs.is_none() {
+        let text = "the source has no CRS: its units are taken as metres; say SRS=... if they are not";
+        warnings.push(text.into());
+    }
+    if message.len() < LEAST_IDENTIFYING_BITS {
+        warnings.push(format!(
+            "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
+             hexadecimal digits or more",
+            message.len(),
+            LEAST_IDENTIFYING_BITS / 4
+        ));
+    }
+    let channel_bits = parameters.code.encode(message).len();
+    let coefficients = 2 * marked.patches * channel_bits * parameters.chip_rate; // on two axes
+    let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.vertices.len() as f64).sqrt();
+    if wanted_rms_m > parameters.tolerance_m {
+        warnings.push(format!(
+            "AMPLITUDE={} would move the vertices by {wanted_rms_m:.2} m RMS, more than TOLERANCE={} m, where many of \
+             them are held: the map is distorted and the mark gains little; lower AMPLITUDE",
+            parameters.amplitude_m, parameters.tolerance_m
+        ));
+    }
+    warnings
 }
 
 fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {

@@ -2,11 +2,12 @@
 //!
 //! Writers of several files, like that of Shapefiles, append to the files of a folder without asking the
 //! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the
-//! source itself, so this is refused before anything is written. Other hosts are not looked at.
+//! source itself, so this is refused before anything is written; and so is a record in the place of the
+//! output, which one of the two would not survive. Other hosts are not looked at.
 
 use crate::{
     error::{Error, Result},
-    source_files::SourceFiles,
+    source_files::{SourceFiles, same_place},
 };
 use std::path::Path;
 
@@ -15,22 +16,34 @@ const INPUT_OPTIONS: [&str; 2] = ["-clipsrc", "-clipdst"];
 
 /// Fails when this process is an ogr2ogr whose target is the source, or the folder of its files.
 pub fn check_is_not_source(files: &SourceFiles) -> Result<()> {
-    let arguments: Vec<String> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
-    match target_in_source(&arguments, |path| files.contain_or_lie_in(path)) {
+    match target(&arguments(), |path| files.contain_or_lie_in(path)) {
         Some(path) => Err(Error::OutputIsSource { path: path.into() }),
         None => Ok(()),
     }
 }
 
-/// The target stands before the source; between and before them stand options and their values.
-fn target_in_source(arguments: &[String], is_source: impl Fn(&Path) -> bool) -> Option<&str> {
+/// Fails when this process is an ogr2ogr whose target is the record.
+pub fn check_is_not_record(record: &str) -> Result<()> {
+    match target(&arguments(), |path| same_place(path, Path::new(record))) {
+        Some(_) => Err(Error::RecordIsOther { path: record.into(), what: "output" }),
+        None => Ok(()),
+    }
+}
+
+fn arguments() -> Vec<String> {
+    std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
+}
+
+/// The target of ogr2ogr, if it is one that is asked for. It stands before the source; between and before them
+/// stand options and their values.
+fn target(arguments: &[String], is_asked_for: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
     if Path::new(program).file_name()? != "ogr2ogr" {
         return None;
     }
     let source = rest.iter().position(|a| a.get(..9).is_some_and(|p| p.eq_ignore_ascii_case("MESHMARK:")))?;
     let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
-    let named = (0..source).find(|&at| !is_input(at) && is_source(Path::new(&rest[at])))?;
+    let named = (0..source).find(|&at| !is_input(at) && is_asked_for(Path::new(&rest[at])))?;
     Some(&rest[named])
 }
 
@@ -40,7 +53,7 @@ mod tests {
 
     fn refused(line: &str) -> bool {
         let arguments: Vec<String> = line.split(' ').map(String::from).collect();
-        target_in_source(&arguments, |path| path == Path::new("map")).is_some()
+        target(&arguments, |path| path == Path::new("map")).is_some()
     }
 
     #[test]

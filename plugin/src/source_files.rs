@@ -145,6 +145,13 @@ pub fn same_file(a: &Path, b: &Path) -> bool {
     FileId::of(a).is_some_and(|id| FileId::of(b) == Some(id))
 }
 
+/// Whether both paths lead to one file, which need not exist yet.
+pub fn same_place(a: &Path, b: &Path) -> bool {
+    let folder =
+        |path: &Path| fs::canonicalize(path.parent().filter(|p| *p != "").unwrap_or(Path::new("."))).ok();
+    same_file(a, b) || a.file_name() == b.file_name() && folder(a).is_some_and(|f| folder(b) == Some(f))
+}
+
 /// Whether writing to `path` would destroy the source of a marked dataset that is open in this process.
 pub fn is_being_read(path: &Path) -> bool {
     let sources = open_sources();
@@ -237,6 +244,15 @@ mod tests {
         assert!(files.contain(&folder.path().join("../").join(&paths[1])));
         drop(files);
         assert!(!paths.iter().any(|path| is_being_read(path)) && !is_being_read(folder.path()));
+    }
+
+    #[test]
+    fn a_place_is_known_before_there_is_a_file() {
+        let (folder, paths) = folder_with(&["map.gpkg"]);
+        let at = |name: &str| folder.path().join(name);
+        assert!(same_place(&at("new.json"), &at("./new.json")) && same_place(&paths[0], &at("map.gpkg")));
+        assert!(same_place(Path::new("new.json"), Path::new("./new.json")));
+        assert!(!same_place(&at("new.json"), &at("other.json")) && !same_place(&at("new"), Path::new("new")));
     }
 
     #[test]
