@@ -188,8 +188,8 @@ fn unregistered(vertices: &VertexCounts, chance: usize) -> String {
         return "the suspect has no vertices, so there is nothing to compare".into();
     }
     format!(
-        "only {} of {} reference vertices match, and {chance} do by chance: the suspect is another map, or could not \
-         be brought onto the reference",
+        "only {} of {} reference vertices match, where {LEAST_MATCHED} are needed and {chance} match by chance: the suspect is \
+         too small a piece, another map, or could not be brought onto the reference",
         vertices.matched, vertices.reference
     )
 }
