@@ -12,6 +12,7 @@ use crate::{
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
+    response::{Kernel, Response},
     spectrum::Basis,
 };
 use faer::{
@@ -220,14 +221,11 @@ pub fn joint(
             solve_lower_triangular_in_place(factor.L(), matrix.as_mut(), Par::Seq);
             matrix
         };
-        let seen = whiten(Mat::from_fn(found.rows.len(), job.carriers, |o, i| {
-            basis.vectors[(found.rows[o], i + 1)]
-        }));
-        let kernel = seen.transpose() * &seen;
-        let product = seen.transpose() * whiten(found.moved.clone());
-        let correlations = [0, 1].map(|axis| product.col_as_slice(axis).to_vec());
-        let trace = 2.0 * (0..job.carriers).map(|i| kernel[(i, i)]).sum::<f64>();
-        Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
+        let seen = Response::carriers(patch, basis, parameters.shape).rows(&found.rows).map(whiten);
+        let moved = whiten(found.moved.clone());
+        let kernels = seen.kernels();
+        let trace = kernels.iter().map(Kernel::trace).sum();
+        Sums::new(&job, job.fold(&kernels, chips), seen.correlations(&moved), chips, trace)
     })?;
     let amplitude_m = parameters.amplitude_m;
     let gram = Mat::from_fn(job.bits, job.bits, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
@@ -328,13 +326,15 @@ impl<'a> Job<'a> {
         bit_of_coefficient(i + 1, self.parameters.chip_rate)
     }
 
-    /// Cᵀ diag(p) K diag(p) C over both axes: m × m from K, m·c × m·c.
-    fn fold(&self, kernel: &Mat<f64>, chips: &[Vec<f64>; 2]) -> Mat<f64> {
+    /// Cᵀ diag(p) K diag(p) C, m × m, of both axes: K are the blocks of the kernel, m·c × m·c each.
+    fn fold(&self, kernels: &[Kernel], chips: &[Vec<f64>; 2]) -> Mat<f64> {
         let mut gram = Mat::zeros(self.bits, self.bits);
-        for k in 0..self.carriers {
-            for i in 0..self.carriers {
-                let sign = chips[0][i] * chips[0][k] + chips[1][i] * chips[1][k];
-                gram[(self.bit(i), self.bit(k))] += sign * kernel[(i, k)];
+        for Kernel { axes, block } in kernels {
+            for k in 0..self.carriers {
+                for i in 0..self.carriers {
+                    let sign: f64 = axes.iter().map(|[a, b]| chips[*a][i] * chips[*b][k]).sum();
+                    gram[(self.bit(i), self.bit(k))] += sign * block[(i, k)];
+                }
             }
         }
         gram

@@ -9,6 +9,7 @@ use meshmark_core::{
     embedding::embed,
     ground::Ground,
     key::SecretKey,
+    map::Map,
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
@@ -37,7 +38,7 @@ fn vertices() -> impl Strategy<Value = Vec<[f64; 2]>> {
 
 fn marked(table: &VertexTable, ground: &Ground, parameters: &Parameters) -> Vec<[f64; 2]> {
     let message = Message::from_hex(MESSAGE).unwrap();
-    embed(table, ground, &key(), &message, parameters).unwrap().coords
+    embed(&Map::of_points(table, *ground), &key(), &message, parameters).unwrap().coords
 }
 
 fn observed(table: &VertexTable, ground: &Ground, moved: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
@@ -50,7 +51,7 @@ fn read_back(
     observed: &[Option<[f64; 2]>],
     p: &Parameters,
 ) -> [Demodulation; 2] {
-    let patches = Patches::new(table, ground, p.patch_size).unwrap();
+    let patches = Patches::new(&Map::of_points(table, *ground), p).unwrap();
     patches.validate().unwrap();
     let carrier = Carrier::new(&key());
     let disturbance = Deformation::estimate(&patches, observed, 128, p).unwrap().predict(
@@ -76,12 +77,12 @@ proptest! {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { patch_size: 290, chip_rate: 1, code: Code::Ldpc, ..Parameters::default() };
         let message = Message::from_bytes(&bytes);
-        let moved = embed(&table, &METRES, &key(), &message, &p).unwrap().coords;
+        let moved = embed(&Map::of_points(&table, METRES), &key(), &message, &p).unwrap().coords;
         let mut seen = observed(&table, &METRES, &moved);
         for displacement in seen.iter_mut().step_by(6) {
             *displacement = None;
         }
-        let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         let disturbance = Deformation::none(0.02).predict(&patches, &seen, 256, p.amplitude_m);
         let found = demodulation::joint(
             &patches, &Carrier::new(&key()), &seen, 128, &p, &disturbance, &|_| ()).unwrap();
@@ -96,7 +97,7 @@ proptest! {
         seed in prop::collection::vec(-1.0..1.0f64, 500),
     ) {
         let table = VertexTable::new(points).unwrap();
-        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
         for patch in patches.as_slice() {
             let n = patch.vertices.len();
             let basis = Basis::low_frequencies(patch, n).unwrap();
@@ -109,7 +110,7 @@ proptest! {
     #[test]
     fn eigenvectors_satisfy_the_biggs_laplacian(points in vertices()) {
         let table = VertexTable::new(points).unwrap();
-        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
         let patch = &patches.as_slice()[0];
         let basis = Basis::low_frequencies(patch, 100).unwrap();
         for i in 0..100 {
@@ -235,7 +236,7 @@ fn largest_difference(patch: &Patch, count: usize) -> f64 {
 #[test]
 fn another_solver_gives_the_same_basis_on_grids_and_on_patches_that_fall_apart() {
     for table in [grid(20), grid(25), clusters()] {
-        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
         for patch in patches.as_slice() {
             assert!(largest_difference(patch, 129) < 1e-6);
         }
@@ -256,7 +257,7 @@ fn a_complete_grid_patch_has_repeated_eigenvalues_and_still_one_basis() {
         }
     }
     edges.sort_unstable();
-    let patch = Patch { vertices: (0..side * side).collect(), edges };
+    let patch = Patch { vertices: (0..side * side).collect(), edges, ..Patch::default() };
     let values = Basis::low_frequencies(&patch, 100).unwrap().eigenvalues;
     assert!(values.windows(2).filter(|w| w[1] - w[0] < 1e-8).count() > 20, "no repeated eigenvalues");
     for count in [99, 100, 101] {
@@ -286,7 +287,7 @@ fn a_mark_made_with_one_solver_is_read_with_another() {
     for table in [grid(20), clusters()] {
         let p = small();
         let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-        let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         let mut scores = vec![0.0; 64];
         for (number, patch) in patches.as_slice().iter().enumerate() {
             let basis = Basis::with_solver(patch, 129, by_nalgebra).unwrap();
@@ -308,7 +309,7 @@ fn decoy_keys_score_like_a_standard_normal_on_a_marked_map() {
     let table = grid(25);
     let p = small();
     let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-    let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+    let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
     let message = Message::from_hex(MESSAGE).unwrap();
     let score = |seed: u8| {
         let carrier = Carrier::new(&SecretKey::from_bytes([seed; 32]));

@@ -5,6 +5,7 @@
 
 mod crs;
 mod error;
+mod features;
 mod labels;
 mod shapes;
 mod survey;
@@ -12,6 +13,7 @@ pub mod wkb;
 
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
+pub use features::{FeatureGeometry, features};
 pub use labels::{Dimension, Label};
 pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.

@@ -8,7 +8,7 @@ use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
-use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_core::{ground::Ground, map::Map, vertices::VertexTable};
 
 /// Which attributes become labels. With labels come shapes: both are for registration.
 #[derive(Debug, Clone, Copy)]
@@ -67,6 +67,8 @@ pub struct Survey {
     pub vertices: VertexTable,
     /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
     pub segments: Vec<[u32; 2]>,
+    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
+    pub polygons: Vec<u32>,
     /// Its CRS: the common one of its layers, or the one it was reprojected into.
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and could be in degrees.
@@ -84,6 +86,15 @@ impl Survey {
     /// [`Error::NoCrs`].
     pub fn ground(&self) -> Result<Ground> {
         self.ground.ok_or(Error::NoCrs)
+    }
+
+    /// The map as the algorithm sees it.
+    ///
+    /// # Errors
+    /// [`Error::NoCrs`].
+    pub fn map(&self) -> Result<Map<'_>> {
+        let Survey { vertices, segments, polygons, .. } = self;
+        Ok(Map { vertices, segments, polygons, ground: self.ground()? })
     }
 }
 
@@ -103,18 +114,20 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Target::Crs(target) => Some(target.clone()),
         Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
-    let (vertices, indices) = VertexTable::indexed(walk.chains.coords)?;
-    let segments = segments(&indices, &walk.chains.starts);
+    let Chains { coords, starts, kinds } = walk.chains;
+    let (vertices, indices) = VertexTable::indexed(coords)?;
+    let segments = segments(&indices, &starts);
+    let polygons = polygons(&indices, &starts, &kinds, vertices.len());
     let ground = match crs::ground(crs.as_ref(), &vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
-    Ok(Survey { vertices, segments, crs, ground, labels: walk.labels, shapes: walk.shapes })
+    Ok(Survey { vertices, segments, polygons, crs, ground, labels: walk.labels, shapes: walk.shapes })
 }
 
 /// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
-fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
+pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
     let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
     if known.is_empty() {
         return Err(Error::NoLayers);
@@ -132,12 +145,15 @@ struct Chains {
     coords: Vec<[f64; 2]>,
     /// Where in `coords` each of them starts, ascending.
     starts: Vec<u32>,
+    /// What each of them is.
+    kinds: Vec<Step>,
 }
 
 impl Chains {
     fn push(&mut self, step: Step, point: [f64; 2]) {
-        if step == Step::First {
+        if step != Step::Next {
             self.starts.push(self.coords.len() as u32);
+            self.kinds.push(step);
         }
         self.coords.push(point);
     }
@@ -146,6 +162,7 @@ impl Chains {
         let offset = self.coords.len() as u32;
         self.starts.extend(other.starts.drain(..).map(|start| start + offset));
         self.coords.append(&mut other.coords);
+        self.kinds.append(&mut other.kinds);
     }
 }
 
@@ -162,6 +179,35 @@ fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
     segments.dedup();
     segments.shrink_to_fit();
     segments
+}
+
+/// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
+fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) -> Vec<u32> {
+    let mut first: Vec<u32> = (0..vertices as u32).collect();
+    fn root(first: &mut [u32], mut v: u32) -> u32 {
+        while first[v as usize] != v {
+            first[v as usize] = first[first[v as usize] as usize];
+            v = first[v as usize];
+        }
+        v
+    }
+    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
+    let mut shell = 0;
+    for ((&start, end), kind) in starts.iter().zip(ends).zip(kinds) {
+        match kind {
+            Step::Shell => shell = indices[start as usize],
+            Step::Hole => {}
+            Step::First | Step::Next => continue,
+        }
+        for &v in &indices[start as usize..end] {
+            let (a, b) = (root(&mut first, v), root(&mut first, shell));
+            first[a.max(b) as usize] = a.min(b);
+        }
+    }
+    for v in 0..vertices as u32 {
+        first[v as usize] = root(&mut first, v);
+    }
+    first
 }
 
 struct Walk<'a> {
@@ -356,5 +402,13 @@ mod tests {
             let map = survey(&dataset, &selection).unwrap();
             assert_eq!(map.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }
+    }
+
+    #[test]
+    fn polygons_are_joined_by_shared_vertices_and_to_their_holes_but_not_by_lines() {
+        // A polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to 8, a polygon 9 10 11.
+        let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
+        let kinds = [Step::Shell, Step::Hole, Step::Shell, Step::First, Step::Shell];
+        assert_eq!(polygons(&indices, &[0, 4, 8, 12, 14], &kinds, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
     }
 }

@@ -11,7 +11,7 @@ use meshmark_core::{
     key::SecretKey,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Subject},
-    record::{self, Record, Reference},
+    record::{self, Record, Reference, TopologyEntry},
     vertices::VertexTable,
 };
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey, wkb};
@@ -100,13 +100,12 @@ impl Marking {
         output::check_is_not_source(&source.files)?;
         let map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
-        let ground = map.ground()?;
+        let on_ground = map.map()?;
         let message = request.subject.message(&request.key);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|error| Error::Threads(error.to_string()))?;
-        let marked = pool.install(|| {
-            embedding::embed(&map.vertices, &ground, &request.key, &message, &options.parameters)
-        })?;
+        let marked =
+            pool.install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
         if let Some(path) = &options.record_path {
             record_file::write(Path::new(path), &record(request, &map, &marked).to_json())?;
         }
@@ -230,6 +229,8 @@ fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
         chip_rate: parameters.chip_rate,
         patch_size: parameters.patch_size,
         tolerance_m: parameters.tolerance_m,
+        shape: parameters.shape,
+        basis: parameters.laplacian,
         precision_crs_units: parameters.precision,
         layers: options.layers.clone(),
         srs: options.srs.clone(),
@@ -240,5 +241,6 @@ fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
             crs: map.crs.as_ref().map(|crs| crs.label()),
         },
         displacement: marked.displacement.into(),
+        topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
     }
 }

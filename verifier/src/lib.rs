@@ -6,6 +6,7 @@
 
 pub mod affine;
 pub mod candidates;
+pub mod compare;
 pub mod decision;
 pub mod decoys;
 mod error;

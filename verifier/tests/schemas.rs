@@ -3,8 +3,8 @@
 use meshmark_core::{
     code::Code,
     embedding::Displacement,
-    options::{Kind, OPTIONS},
-    record::{DisplacementEntry, Record, Reference},
+    options::{Kind, Laplacian, OPTIONS, Shape},
+    record::{DisplacementEntry, Record, Reference, TopologyEntry},
 };
 use serde_json::{Value, json};
 use std::{
@@ -81,11 +81,14 @@ fn record() -> Record {
         chip_rate: 2,
         patch_size: 480,
         tolerance_m: 0.75,
+        shape: Shape::Free,
+        basis: Laplacian::Biggs,
         precision_crs_units: None,
         layers: None,
         srs: None,
         reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
         displacement: DisplacementEntry::from(Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 }),
+        topology: TopologyEntry { t_junctions: 12, attenuated_vertices: 0 },
     }
 }
 
@@ -116,7 +119,7 @@ fn the_record_that_the_driver_wrote_is_valid() {
 #[test]
 fn wrong_records_are_refused() {
     let record = json_of(&record());
-    assert_closed("record", &record, &["", "/reference", "/displacement"]);
+    assert_closed("record", &record, &["", "/reference", "/displacement", "/topology"]);
     let changes = [
         ("/meshmark_record", json!(2)),
         ("/key_id", json!("434471506306423")),
@@ -133,6 +136,8 @@ fn wrong_records_are_refused() {
         ("/reference/vertices_sha256", json!("0F".repeat(32))),
         ("/displacement/rms_m", json!(-0.1)),
         ("/displacement/max_m", Value::Null),
+        ("/topology/t_junctions", json!(-1)),
+        ("/topology/attenuated_vertices", json!(0.5)),
     ];
     assert_refused("record", &record, &changes);
 }
