@@ -10,8 +10,9 @@ use meshmark_core::{
     ground::Ground,
     key::SecretKey,
     map::Map,
+    mesh::Mesh,
     message::Message,
-    options::Parameters,
+    options::{Laplacian, Parameters},
     patches::{Patch, Patches},
     spectrum::Basis,
     vertices::VertexTable,
@@ -95,9 +96,11 @@ proptest! {
     fn analysis_after_synthesis_is_the_identity(
         points in vertices(),
         seed in prop::collection::vec(-1.0..1.0f64, 500),
+        laplacian in prop_oneof![Just(Laplacian::Biggs), Just(Laplacian::Cotangent)],
     ) {
         let table = VertexTable::new(points).unwrap();
-        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
+        let p = Parameters { laplacian, ..small() };
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         for patch in patches.as_slice() {
             let n = patch.vertices.len();
             let basis = Basis::low_frequencies(patch, n).unwrap();
@@ -105,6 +108,26 @@ proptest! {
             let worst = back.iter().zip(&seed).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             prop_assert!(worst < 1e-9, "{worst}");
         }
+    }
+
+    #[test]
+    fn eigenvectors_satisfy_the_cotangent_laplacian(points in vertices()) {
+        let table = VertexTable::new(points).unwrap();
+        let p = Parameters { laplacian: Laplacian::Cotangent, patch_size: table.len(), ..small() };
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+        let basis = Basis::low_frequencies(&patches.as_slice()[0], 100).unwrap();
+        let mesh = Mesh::delaunay(&table.local(1.0)).unwrap();
+        let stiffness = stiffness(table.coords(), mesh.triangles());
+        let largest = (0..table.len()).map(|v| stiffness[(v, v)]).fold(0.0, f64::max);
+        let image = &stiffness * &basis.vectors;
+        for i in 0..100 {
+            for v in 0..table.len() {
+                let expected = largest * basis.eigenvalues[i] * basis.vectors[(v, i)];
+                prop_assert!((image[(v, i)] - expected).abs() < 1e-9 * largest);
+            }
+        }
+        let gram = basis.vectors.transpose() * &basis.vectors;
+        prop_assert!((gram - Mat::<f64>::identity(100, 100)).norm_max() < 1e-9);
     }
 
     #[test]
@@ -217,6 +240,26 @@ fn clusters() -> VertexTable {
     VertexTable::new(coords).unwrap()
 }
 
+/// The stiffness matrix of linear finite elements: the sides a and b of a triangle that face two of its corners make
+/// an entry a·b / 4A. Triangles flatter than 1 : 100 are as stiff as those.
+fn stiffness(coords: &[[f64; 2]], triangles: &[[u32; 3]]) -> Mat<f64> {
+    let mut matrix = Mat::zeros(coords.len(), coords.len());
+    for triangle in triangles {
+        let at = triangle.map(|v| coords[v as usize]);
+        let side = |i: usize| [0, 1].map(|axis| at[(i + 2) % 3][axis] - at[(i + 1) % 3][axis]);
+        let product = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let ([ax, ay], [bx, by]) = (side(0), side(1));
+        let longest2 = (0..3).map(|i| product(side(i), side(i))).fold(0.0, f64::max);
+        let area2 = (ax * by - ay * bx).abs().max(0.01 * longest2);
+        for i in 0..3 {
+            for j in 0..3 {
+                matrix[(triangle[i] as usize, triangle[j] as usize)] += product(side(i), side(j)) / area2;
+            }
+        }
+    }
+    matrix
+}
+
 fn by_nalgebra(matrix: Mat<f64>, _: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = matrix.nrows();
     let solved = nalgebra::DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]).symmetric_eigen();
@@ -236,9 +279,11 @@ fn largest_difference(patch: &Patch, count: usize) -> f64 {
 #[test]
 fn another_solver_gives_the_same_basis_on_grids_and_on_patches_that_fall_apart() {
     for table in [grid(20), grid(25), clusters()] {
-        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
-        for patch in patches.as_slice() {
-            assert!(largest_difference(patch, 129) < 1e-6);
+        for laplacian in [Laplacian::Biggs, Laplacian::Cotangent] {
+            let p = Parameters { laplacian, ..small() };
+            for patch in Patches::new(&Map::of_points(&table, METRES), &p).unwrap().as_slice() {
+                assert!(largest_difference(patch, 129) < 1e-6, "{laplacian:?}");
+            }
         }
     }
 }
@@ -275,7 +320,7 @@ fn another_solver_gives_the_same_basis_on_paths_cycles_stars_and_complete_graphs
     let star = (1..n).map(|i| [0, i]).collect();
     let complete = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).collect();
     for edges in [path, cycle, star, complete] {
-        let patch = Patch { vertices: (0..n).collect(), edges };
+        let patch = Patch { vertices: (0..n).collect(), edges, ..Patch::default() };
         for count in [2, 31, 32, 60] {
             assert!(largest_difference(&patch, count) < 1e-9, "{count}");
         }

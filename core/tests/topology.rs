@@ -6,18 +6,44 @@ use meshmark_core::{
     key::SecretKey,
     map::Map,
     message::Message,
-    options::Parameters,
+    options::{Laplacian, Parameters, Shape},
+    patches::Patches,
     vertices::VertexTable,
 };
 use proptest::prelude::*;
 
 const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 
-/// Coordinates and the pairs of them that are joined, before duplicates are merged.
+/// Coordinates, the pairs of them that are joined, and which of these are sides of polygons, before duplicates are
+/// merged.
 #[derive(Debug, Clone, Default)]
 struct Sketch {
     coords: Vec<[f64; 2]>,
     joined: Vec<[u32; 2]>,
+    sides: Vec<[u32; 2]>,
+}
+
+/// A map.
+struct Town {
+    vertices: VertexTable,
+    segments: Vec<[u32; 2]>,
+    polygons: Vec<u32>,
+}
+
+impl Town {
+    fn mark(&self, parameters: &Parameters) -> Marked {
+        let key = SecretKey::from_bytes([9; 32]);
+        embed(&self.map(), &key, &Message::from_hex("0123456789abcdef").unwrap(), parameters).unwrap()
+    }
+
+    fn map(&self) -> Map<'_> {
+        let Town { vertices, segments, polygons } = self;
+        Map { vertices, segments, polygons, ground: METRES }
+    }
+
+    fn coords(&self) -> &[[f64; 2]] {
+        self.vertices.coords()
+    }
 }
 
 impl Sketch {
@@ -28,10 +54,12 @@ impl Sketch {
     }
 
     fn ring(&mut self, corners: &[[f64; 2]]) {
+        let first = self.joined.len();
         self.chain(&[corners, &corners[..1]].concat());
+        self.sides.extend(&self.joined[first..]);
     }
 
-    fn survey(&self) -> (VertexTable, Vec<[u32; 2]>) {
+    fn survey(&self) -> Town {
         let (table, indices) = VertexTable::indexed(self.coords.clone()).unwrap();
         let pair = |&[a, b]: &[u32; 2]| {
             let (a, b) = (indices[a as usize], indices[b as usize]);
@@ -40,7 +68,14 @@ impl Sketch {
         let mut segments: Vec<[u32; 2]> = self.joined.iter().map(pair).filter(|[a, b]| a != b).collect();
         segments.sort_unstable();
         segments.dedup();
-        (table, segments)
+        // Along a ring, labels go round in one direction or the other: two passes reach every corner.
+        let mut polygons: Vec<u32> = (0..table.len() as u32).collect();
+        let there: Vec<[u32; 2]> = self.sides.iter().map(pair).collect();
+        for [a, b] in there.iter().chain(there.iter().rev()).chain(&there) {
+            let first = polygons[*a as usize].min(polygons[*b as usize]);
+            (polygons[*a as usize], polygons[*b as usize]) = (first, first);
+        }
+        Town { vertices: table, segments, polygons }
     }
 }
 
@@ -88,10 +123,12 @@ fn small_town() -> Sketch {
     town(&(0..30).map(block).collect::<Vec<_>>())
 }
 
-fn mark(table: &VertexTable, segments: &[[u32; 2]], parameters: &Parameters) -> Marked {
-    let map = Map { segments, ..Map::of_points(table, METRES) };
-    let key = SecretKey::from_bytes([9; 32]);
-    embed(&map, &key, &Message::from_hex("0123456789abcdef").unwrap(), parameters).unwrap()
+fn shapes() -> impl Strategy<Value = Shape> {
+    prop_oneof![Just(Shape::Free), Just(Shape::Rigid)]
+}
+
+fn laplacians() -> impl Strategy<Value = Laplacian> {
+    prop_oneof![Just(Laplacian::Biggs), Just(Laplacian::Cotangent)]
 }
 
 fn parameters() -> Parameters {
@@ -129,19 +166,23 @@ fn crossings(segments: &[[u32; 2]], coords: &[[f64; 2]]) -> Vec<[usize; 2]> {
     found
 }
 
+fn length(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn nothing_crosses_that_did_not_and_junctions_hold(sketch in towns()) {
-        let (table, segments) = sketch.survey();
-        let marked = mark(&table, &segments, &parameters());
-        prop_assert_eq!(crossings(&segments, table.coords()), crossings(&segments, &marked.coords));
-        prop_assert!(marked.junctions >= 30 && marked.attenuated > 0);
-        for &[a, b] in &segments {
+    fn nothing_crosses_that_did_not_and_junctions_hold(sketch in towns(), shape in shapes(), laplacian in laplacians()) {
+        let town = sketch.survey();
+        let marked = town.mark(&Parameters { shape, laplacian, ..parameters() });
+        prop_assert_eq!(crossings(&town.segments, town.coords()), crossings(&town.segments, &marked.coords));
+        prop_assert!(marked.attenuated > 0);
+        for &[a, b] in &town.segments {
             let [a, b] = [a as usize, b as usize];
-            for v in (0..table.len()).filter(|v| *v != a && *v != b) {
-                let before = distance(table.coords()[v], table.coords()[a], table.coords()[b]);
+            for v in (0..town.coords().len()).filter(|v| *v != a && *v != b) {
+                let before = distance(town.coords()[v], town.coords()[a], town.coords()[b]);
                 if before < 1e-9 {
                     let after = distance(marked.coords[v], marked.coords[a], marked.coords[b]);
                     prop_assert!(after < 1e-8, "vertex {v} left segment {a} {b}: {after}");
@@ -151,33 +192,73 @@ proptest! {
     }
 
     #[test]
-    fn no_vertex_is_further_away_than_the_tolerance(sketch in towns(), tolerance_m in 0.15..0.6f64) {
-        let (table, segments) = sketch.survey();
-        let marked = mark(&table, &segments, &Parameters { tolerance_m, ..parameters() });
-        for (from, to) in table.coords().iter().zip(&marked.coords) {
+    fn no_vertex_is_further_away_than_the_tolerance(
+        sketch in towns(),
+        shape in shapes(),
+        tolerance_m in 0.15..0.6f64,
+    ) {
+        let town = sketch.survey();
+        let marked = town.mark(&Parameters { tolerance_m, shape, ..parameters() });
+        for (from, to) in town.coords().iter().zip(&marked.coords) {
             prop_assert!((to[0] - from[0]).hypot(to[1] - from[1]) <= tolerance_m);
         }
     }
 }
 
 #[test]
+fn rigid_houses_keep_their_shape_and_move_as_far_as_free_ones() {
+    let town = small_town().survey();
+    let rigid = Parameters { shape: Shape::Rigid, ..parameters() };
+    let marked = town.mark(&rigid);
+    // Sides and diagonals of every house: all distances between vertices of one polygon.
+    for i in 0..town.coords().len() {
+        for j in (0..i).filter(|&j| town.polygons[i] == town.polygons[j]) {
+            let before = length(town.coords()[i], town.coords()[j]);
+            let after = length(marked.coords[i], marked.coords[j]);
+            assert!((after - before).abs() < 1e-6 * before, "{before} became {after}");
+        }
+    }
+    let free = town.mark(&parameters());
+    assert!(free.coords != marked.coords);
+    let ratio = marked.displacement.rms_m / free.displacement.rms_m;
+    assert!((0.8..1.25).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_house_is_never_cut_by_the_border_of_a_patch() {
+    let town = small_town().survey();
+    let patches = Patches::new(&town.map(), &Parameters { shape: Shape::Rigid, ..parameters() }).unwrap();
+    patches.validate().unwrap();
+    assert!(patches.as_slice().len() > 4);
+    let mut patch_of = vec![0; town.coords().len()];
+    for (number, patch) in patches.as_slice().iter().enumerate() {
+        patch.vertices.iter().for_each(|&v| patch_of[v as usize] = number);
+    }
+    for (v, &first) in town.polygons.iter().enumerate() {
+        assert_eq!(patch_of[v], patch_of[first as usize]);
+    }
+    let smallest = patches.as_slice().iter().map(|patch| patch.vertices.len()).min().unwrap();
+    assert!(smallest >= 150 - 60, "{smallest}");
+}
+
+#[test]
 fn the_same_for_any_number_of_threads() {
-    let (table, segments) = small_town().survey();
+    let town = small_town().survey();
     let with_threads = |count: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-        pool.install(|| mark(&table, &segments, &parameters()))
+        pool.install(|| town.mark(&parameters()))
     };
     assert_eq!(with_threads(1), with_threads(3));
 }
 
 #[test]
 fn on_a_grid_junctions_hold_within_a_step() {
-    let (table, segments) = small_town().survey();
-    let marked = mark(&table, &segments, &Parameters { precision: Some(0.001), ..parameters() });
-    for &[a, b] in &segments {
+    let town = small_town().survey();
+    let marked = town.mark(&Parameters { precision: Some(0.001), ..parameters() });
+    for &[a, b] in &town.segments {
         let [a, b] = [a as usize, b as usize];
-        for v in (0..table.len()).filter(|v| *v != a && *v != b) {
-            if distance(table.coords()[v], table.coords()[a], table.coords()[b]) < 1e-9 {
+        for v in (0..town.coords().len()).filter(|v| *v != a && *v != b) {
+            if distance(town.coords()[v], town.coords()[a], town.coords()[b]) < 1e-9 {
                 assert!(distance(marked.coords[v], marked.coords[a], marked.coords[b]) < 0.0015);
             }
         }

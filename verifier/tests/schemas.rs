@@ -116,6 +116,33 @@ fn the_record_that_the_driver_wrote_is_valid() {
     assert_valid("record", &serde_json::from_str(&text).unwrap());
 }
 
+/// What the command prints of the test vectors.
+fn comparison() -> Value {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));
+    command.args(["compare", "--json"]);
+    command.args(["fixtures/kotka.gpkg", "fixtures/vectors/marked.gpkg"].map(|file| root().join(file)));
+    serde_json::from_slice(&command.output().unwrap().stdout).unwrap()
+}
+
+#[test]
+fn a_comparison_is_valid_and_wrong_ones_are_refused() {
+    let comparison = comparison();
+    assert_valid("compare", &comparison);
+    let objects = comparison.as_object().unwrap().iter().filter(|(_, value)| value.is_object());
+    let objects: Vec<String> = objects.map(|(name, _)| format!("/{name}")).collect();
+    assert_eq!(objects.len(), 8);
+    for object in &objects {
+        let fields = comparison.pointer(object).unwrap().as_object().unwrap();
+        let negative: Vec<(String, Value)> =
+            fields.keys().map(|field| (format!("{object}/{field}"), json!(-1))).collect();
+        let negative: Vec<(&str, Value)> = negative.iter().map(|(p, v)| (p.as_str(), v.clone())).collect();
+        assert_refused("compare", &comparison, &negative);
+    }
+    let mut closed = vec![""];
+    closed.extend(objects.iter().map(String::as_str));
+    assert_closed("compare", &comparison, &closed);
+}
+
 #[test]
 fn wrong_records_are_refused() {
     let record = json_of(&record());

@@ -156,7 +156,7 @@ impl Product {
         for (name, value) in options {
             command.arg("-oo").arg(format!("{name}={value}"));
         }
-        self.options.iter().for_each(|option| drop(command.args(["-oo", option])));
+        command.args(self.options.iter().flat_map(|option| ["-oo", option]));
         let output = command.output().map_err(|e| format!("ogr2ogr cannot be run: {e}"))?;
         match output.status.success() {
             true => Ok(()),

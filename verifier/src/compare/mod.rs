@@ -117,16 +117,16 @@ pub struct Overlaps {
     pub new_area_m2: f64,
 }
 
-/// Pairs of segments of any features that cross in their interiors.
+/// Pairs of segments of any features that cross by more than 1e-6 m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Crossings {
     /// In the reference.
     pub before: usize,
     /// In the marked map.
     pub after: usize,
-    /// Pairs that did not cross before and are more than 1e-6 m across each other now.
+    /// Pairs that did not cross before, by no distance.
     pub new: usize,
-    /// Pairs that did, by more than 1e-6 m, and cross no longer.
+    /// Pairs that cross no longer, by no distance.
     pub lost: usize,
 }
 

@@ -104,19 +104,15 @@ pub(super) fn crossings(
     ground: &Ground,
 ) -> Crossings {
     let (old, new) = (crossing_pairs(segments, before), crossing_pairs(segments, after));
-    let count = |pairs: &BTreeSet<[u32; 2]>, others: &BTreeSet<[u32; 2]>, coords: &[[f64; 2]]| {
-        let only = pairs.difference(others);
-        only.filter(|[i, j]| {
-            let ends = [*i, *j].map(|s| segments[s as usize].map(|v| coords[v as usize]));
-            depth_m(ends, ground) > GRAZE_M
-        })
-        .count()
+    let is_deep = |[i, j]: &[u32; 2], coords: &[[f64; 2]]| {
+        let ends = [*i, *j].map(|s| segments[s as usize].map(|v| coords[v as usize]));
+        depth_m(ends, ground) > GRAZE_M
     };
     Crossings {
-        before: old.len(),
-        after: new.len(),
-        new: count(&new, &old, after),
-        lost: count(&old, &new, before),
+        before: old.iter().filter(|pair| is_deep(pair, before)).count(),
+        after: new.iter().filter(|pair| is_deep(pair, after)).count(),
+        new: new.difference(&old).filter(|pair| is_deep(pair, after)).count(),
+        lost: old.difference(&new).filter(|pair| is_deep(pair, before)).count(),
     }
 }
 
