@@ -8,15 +8,18 @@ use crate::{
     Result,
     carrier::{Carrier, bit_of_coefficient},
     code::{Code, Decoded},
-    deformation::{Found, Observed, Prediction, factor},
+    deformation::{Covariance, Found, Observed, Prediction, factor},
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
     spectrum::Basis,
 };
 use faer::{
-    Mat, Par,
-    linalg::{solvers::Solve, triangular_solve::solve_lower_triangular_in_place},
+    Accum, Mat, Par,
+    linalg::{
+        matmul::triangular::{self, BlockStructure},
+        solvers::Solve,
+    },
 };
 use rand_chacha::{
     ChaCha20Rng,
@@ -215,16 +218,12 @@ pub fn joint(
         }
         let weights: Vec<f64> =
             found.rows.iter().map(|&row| disturbance.weights[patch.vertices[row] as usize]).collect();
-        let factor = factor(&disturbance.deformation.matrix(&found.at, &weights));
-        let whiten = |mut matrix: Mat<f64>| {
-            solve_lower_triangular_in_place(factor.L(), matrix.as_mut(), Par::Seq);
-            matrix
-        };
-        let seen = whiten(Mat::from_fn(found.rows.len(), job.carriers, |o, i| {
+        let covariance = Covariance::new(&disturbance.deformation, &found.at, &weights);
+        let seen = covariance.whiten(Mat::from_fn(found.rows.len(), job.carriers, |o, i| {
             basis.vectors[(found.rows[o], i + 1)]
         }));
-        let kernel = seen.transpose() * &seen;
-        let product = seen.transpose() * whiten(found.moved.clone());
+        let kernel = lower_gram(&seen);
+        let product = seen.transpose() * covariance.whiten(found.moved.clone());
         let correlations = [0, 1].map(|axis| product.col_as_slice(axis).to_vec());
         let trace = 2.0 * (0..job.carriers).map(|i| kernel[(i, i)]).sum::<f64>();
         Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
@@ -244,7 +243,24 @@ pub fn joint(
     })
 }
 
-/// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹.
+/// The lower triangle of XᵀX, zeros above it.
+fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
+    let mut gram = Mat::zeros(x.ncols(), x.ncols());
+    triangular::matmul(
+        gram.as_mut(),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        x.transpose(),
+        BlockStructure::Rectangular,
+        x,
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    gram
+}
+
+/// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹, of the lower triangle of G.
 fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let m = gram.nrows();
     (0..m).for_each(|j| gram[(j, j)] += 1.0);
@@ -266,7 +282,7 @@ struct Job<'a> {
 
 /// What the patches add up to.
 struct Sums {
-    /// m × m for [`joint`], m × 1 for [`paper`], of m channel bits.
+    /// The lower triangle of m × m for [`joint`], m × 1 for [`paper`], of m channel bits.
     gram: Mat<f64>,
     scores: Vec<f64>,
     correlations: Vec<f64>,
@@ -328,13 +344,16 @@ impl<'a> Job<'a> {
         bit_of_coefficient(i + 1, self.parameters.chip_rate)
     }
 
-    /// Cᵀ diag(p) K diag(p) C over both axes: m × m from K, m·c × m·c.
+    /// The lower triangle of Cᵀ diag(p) K diag(p) C over both axes, m × m, from that of K, m·c × m·c.
     fn fold(&self, kernel: &Mat<f64>, chips: &[Vec<f64>; 2]) -> Mat<f64> {
         let mut gram = Mat::zeros(self.bits, self.bits);
         for k in 0..self.carriers {
-            for i in 0..self.carriers {
+            let column = &kernel.col_as_slice(k)[k..];
+            for (i, value) in (k..self.carriers).zip(column) {
                 let sign = chips[0][i] * chips[0][k] + chips[1][i] * chips[1][k];
-                gram[(self.bit(i), self.bit(k))] += sign * kernel[(i, k)];
+                // Two chips of one bit meet on the diagonal, once from either side of K's.
+                let times = if i != k && self.bit(i) == self.bit(k) { 2.0 } else { 1.0 };
+                gram[(self.bit(i), self.bit(k))] += times * sign * value;
             }
         }
         gram
