@@ -78,6 +78,15 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// A map in a known CRS, without labels and shapes.
+    ///
+    /// # Errors
+    /// A CRS in which metres mean nothing.
+    pub(crate) fn in_crs(vertices: VertexTable, crs: &CoordinateSystem) -> Result<Survey> {
+        let ground = Some(crs::ground(Some(crs), &vertices)?);
+        Ok(Survey { vertices, crs: Some(crs.clone()), ground, labels: Vec::new(), shapes: Vec::new() })
+    }
+
     /// Metres on the ground.
     ///
     /// # Errors
@@ -299,7 +308,7 @@ impl From<wkb::WkbError> for Visit {
 }
 
 /// Brings coordinates into `target`; those of a layer without a CRS are taken to be in it.
-fn reproject(
+pub(crate) fn reproject(
     coords: &mut [[f64; 2]],
     from: Option<&CoordinateSystem>,
     target: &CoordinateSystem,

@@ -6,11 +6,15 @@
 
 pub mod affine;
 pub mod candidates;
+mod consensus;
+mod crs_search;
+pub mod cubic;
 pub mod decision;
 pub mod decoys;
 mod error;
 pub mod explain;
 mod joined;
+mod landmarks;
 pub mod matching;
 pub mod progress;
 pub mod reading;
@@ -19,6 +23,7 @@ pub mod report;
 mod shapes;
 pub mod survival;
 pub mod verify;
+mod windows;
 
 pub use error::{Error, ExitCode, Result};
 pub use verify::{Demodulator, Request, verify};

@@ -2,13 +2,14 @@
 
 use crate::{
     Error, Result,
+    crs_search::{self, Registered, side},
     decision::{Decision, decide},
     decoys::Decoys,
     joined::Graph,
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
-    registration::{LEAST_MATCHED, Registration, Side, Start, register},
+    registration::{LEAST_MATCHED, Registrar, Registration, Start},
     report::{Report, VertexCounts},
 };
 use meshmark_core::{
@@ -133,7 +134,8 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         .map_err(|error| Error::Usage(format!("the reference {}: {error}", request.reference.display())))?;
     progress.start("reading", 0);
     let plain = Reading { layers: None, srs: None, landmarks: request.landmarks() };
-    let (suspect, suspect_crs) = reading::suspect(&request.suspect, &plain, reference)?;
+    let suspect = reading::suspect(&request.suspect, &plain, reference)?;
+    let suspect_crs = suspect.layer_crs.clone();
 
     progress.start("patches", 0);
     let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size)?;
@@ -141,7 +143,10 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
 
     progress.start("registration", 0);
     let (radius_m, start) = (request.radius_m, request.registration);
-    let registration = register(side(reference), side(&suspect), &ground, radius_m, start);
+    let registrar = Registrar::new(side(reference), &ground, radius_m);
+    let file = (request.suspect.as_path(), &plain);
+    let Registered { map: suspect, registration } =
+        crs_search::register(&registrar, reference, suspect, file, start)?;
 
     progress.start("matching", 0);
     let moved = registration.apply(suspect.vertices.coords());
@@ -159,7 +164,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         reference_digest: reference.vertices.digest(),
         crs: reference.crs.as_ref().map(|crs| crs.label()),
         suspect_crs,
-        found: Err(unregistered(matches.count, reference.vertices.len(), chance)),
+        found: Err(unregistered(matches.count, reference.vertices.len(), chance, start)),
         decoys: None,
     };
     if matches.count >= LEAST_MATCHED && matches.count >= 2 * chance {
@@ -172,10 +177,19 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     Ok(seen)
 }
 
-fn unregistered(matched: usize, reference: usize, chance: usize) -> String {
+fn unregistered(matched: usize, reference: usize, chance: usize, start: Start) -> String {
+    let remedy = match start {
+        Start::Auto => "",
+        Start::Landmarks => " by landmarks; --registration auto tries all that is known",
+        Start::Geometry => {
+            " by geometry, for which too few of its features have a shape of their own if it is no other map; \
+             --registration auto tries landmarks too"
+        }
+        Start::None => ", as was asked; --registration auto looks for its place",
+    };
     format!(
         "{matched} of {reference} reference vertices match, no more than by chance ({chance}): the suspect was not \
-         registered"
+         registered{remedy}"
     )
 }
 
@@ -203,10 +217,6 @@ fn demodulate(
             demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?
         }
     })
-}
-
-fn side(survey: &Survey) -> Side<'_> {
-    Side { vertices: &survey.vertices, labels: &survey.labels, shapes: &survey.shapes }
 }
 
 /// The record must be of this key, and its message what key and recipient give.
