@@ -79,6 +79,7 @@ pub struct Report {
 #[allow(missing_docs)]
 pub struct Registration {
     pub method: String,
+    pub affine: [f64; 6],
     pub landmarks: usize,
     pub rms_m: Option<f64>,
 }
@@ -165,10 +166,12 @@ impl Product {
         reference: &Path,
         asked: Asked,
         demodulator: &str,
+        registration: &str,
         suspect: &Path,
     ) -> Result<Report> {
         let mut command = Command::new(&self.meshmark);
         command.env("RAYON_NUM_THREADS", "1").args(["verify", "--json", "--demodulator", demodulator]);
+        command.args(["--registration", registration]);
         command.arg("--key").arg(key).arg("--reference").arg(reference);
         match asked {
             Asked::Record(record) => command.arg("--record").arg(record),
