@@ -31,6 +31,9 @@ pub const LEAST_MATCHED: usize = 30;
 /// A polynomial is kept when it matches this many times as many vertices as the affine map, and
 /// [`LEAST_MATCHED`] more: its 20 coefficients find some anywhere.
 const CLEARLY_MORE: f64 = 1.1;
+/// Rounds of least squares at the end, which may lose a few of the pairs.
+const POLISH: usize = 2;
+const STILL_MATCHED: f64 = 0.98;
 /// Pairs of places that tell of a distortion are so many matching radii apart at most.
 const DISTORTED: f64 = 50.0;
 /// A polynomial is fitted to at least so many pairs.
@@ -291,7 +294,24 @@ impl Search<'_> {
             let Some(affine) = fit else { break };
             best = best.or_better(self.matched(affine.into(), radius_m));
         }
-        self.registration(method, landmarks, &best)
+        self.registration(method, landmarks, &self.polish(best))
+    }
+
+    /// Least squares instead of least distances: once the pairs are right they are the more exact, for all that
+    /// is left is the mark and noise.
+    fn polish(&self, best: Pairs) -> Pairs {
+        let least = STILL_MATCHED * best.from.len() as f64;
+        let mut polished = best;
+        for _ in 0..POLISH {
+            let fit = Affine::fit(&polished.from, &polished.to, &vec![1.0; polished.from.len()]);
+            let Some(affine) = fit else { break };
+            let next = self.matched(affine.into(), self.registrar.radius_m);
+            if (next.from.len() as f64) < least {
+                break;
+            }
+            polished = next;
+        }
+        polished
     }
 
     /// Adds a cubic polynomial, where that matches clearly more vertices than the affine map alone.

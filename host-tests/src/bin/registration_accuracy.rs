@@ -72,18 +72,26 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<()> {
     let product = Product::of_this_build()?;
-    println!("{}, seed {}; millimetres RMS over the vertices of the suspect's part of the reference\n", product.version()?, arguments.seed);
+    println!(
+        "{}, seed {}; millimetres RMS over the reference vertices where the suspect is\n",
+        product.version()?,
+        arguments.seed
+    );
     let titles: Vec<&str> = SUSPECTS.iter().map(|suspect| suspect.title).collect();
     println!("| map | vertices | {} |", titles.join(" | "));
     println!("|---|---|{}", "---|".repeat(titles.len()));
+    let mut longest = vec![0.0f64; SUSPECTS.len()];
     for (i, map) in arguments.maps.iter().enumerate() {
-        println!("{}", row(&product, map, arguments.seed + i as u64).map_err(|e| format!("{}: {e}", map.display()))?);
+        let row = row(&product, map, arguments.seed + i as u64, &mut longest);
+        println!("{}", row.map_err(|error| format!("{}: {error}", map.display()))?);
     }
+    let longest: Vec<String> = longest.iter().map(|seconds| format!("{seconds:.2}")).collect();
+    println!("\n| longest registration, seconds on one thread | {} |", longest.join(" | "));
     Ok(())
 }
 
-/// A row of the table: one map.
-fn row(product: &Product, path: &Path, seed: u64) -> Result<String> {
+/// A row of the table: one map. `longest`: seconds of the longest registration so far, for every suspect.
+fn row(product: &Product, path: &Path, seed: u64, longest: &mut [f64]) -> Result<String> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str| folder.path().join(name);
     let (key, record, marked) = (file("key.json"), file("record.json"), file("marked.gpkg"));
@@ -101,6 +109,7 @@ fn row(product: &Product, path: &Path, seed: u64) -> Result<String> {
         let report =
             product.verify(&key, path, Asked::Record(&record), "joint", suspect.registration, &file)?;
         let rms_m = error_m(&reference.vertices()?, &part.vertices()?, &there, &report.registration);
+        longest[i] = longest[i].max(report.seconds.get("registration").copied().unwrap_or_default());
         cells.push(match rms_m <= FOUND_M {
             true => format!("{:.1}", 1000.0 * rms_m),
             false => "—".into(),

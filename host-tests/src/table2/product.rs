@@ -4,6 +4,7 @@ use super::Result;
 use meshmark_core::key::SecretKey;
 use serde::{Deserialize, Serialize};
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
@@ -72,6 +73,7 @@ pub struct Report {
     pub p_recipient_log10: Option<f64>,
     pub registration: Registration,
     pub vertices: Vertices,
+    pub seconds: BTreeMap<String, f64>,
 }
 
 /// How the suspect was brought onto the reference.
