@@ -176,7 +176,10 @@ mod tests {
         for line in lines {
             let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect(line)).collect();
             let &[code, west, south, east, north] = numbers.as_slice() else { panic!("{line}") };
-            assert!(code.fract() == 0.0 && south <= north && west.abs() <= 180.0 && east.abs() <= 180.0, "{line}");
+            assert!(
+                code.fract() == 0.0 && south <= north && west.abs() <= 180.0 && east.abs() <= 180.0,
+                "{line}"
+            );
         }
     }
 }

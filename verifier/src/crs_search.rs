@@ -86,8 +86,8 @@ fn in_place(
 
 impl Registered {
     fn new(map: Survey, assumption: Option<&Assumption>, registration: Registration) -> Self {
-        let read_as = assumption
-            .map(|assumed| ReadAs { crs: assumed.crs.label(), axes_swapped: assumed.axes_swapped });
+        let read_as =
+            assumption.map(|assumed| ReadAs { crs: assumed.crs.label(), axes_swapped: assumed.axes_swapped });
         Registered { map, registration: Registration { read_as, ..registration } }
     }
 

@@ -28,6 +28,10 @@ const SOME_AGREE: f64 = 0.2;
 const ALMOST_ALL: f64 = 0.9;
 /// Fewer matched vertices than this are chance: nothing was found.
 pub const LEAST_MATCHED: usize = 30;
+/// And so are fewer than this many times those that match out of place.
+pub const TIMES_CHANCE: usize = 2;
+/// A shift, in matching radii, after which no map is in place.
+pub const OUT_OF_PLACE: [f64; 2] = [7.3, -5.1];
 /// A polynomial is kept when it matches this many times as many vertices as the affine map, and
 /// [`LEAST_MATCHED`] more: its 20 coefficients find some anywhere.
 const CLEARLY_MORE: f64 = 1.1;
@@ -82,8 +86,7 @@ impl std::fmt::Display for ReadAs {
 impl Registration {
     /// The suspect's vertices in reference coordinates.
     pub fn apply(&self, suspect: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let transform =
-            Transform { affine: Affine { coefficients: self.affine }, cubic: self.polynomial };
+        let transform = Transform { affine: Affine { coefficients: self.affine }, cubic: self.polynomial };
         suspect.iter().map(|p| transform.apply(*p)).collect()
     }
 
@@ -157,11 +160,13 @@ impl<'a> Registrar<'a> {
         let search = Search { registrar: self, suspect };
         let found = match start {
             Start::None => return self.as_it_stands(suspect),
-            Start::Auto => search.best(&[Way::AsItStands, Way::Landmarks, Way::Shapes, Way::Lines, Way::Points]),
+            Start::Auto => {
+                search.best(&[Way::AsItStands, Way::Landmarks, Way::Shapes, Way::Lines, Way::Points])
+            }
             Start::Landmarks => search.best(&[Way::Landmarks]),
             Start::Geometry => search.best(&[Way::Shapes, Way::Lines, Way::Points]),
         };
-        if found.matched < LEAST_MATCHED { self.as_it_stands(suspect) } else { found }
+        if found.matched == 0 { self.as_it_stands(suspect) } else { found }
     }
 
     /// No map at all.
@@ -211,7 +216,7 @@ impl Search<'_> {
     /// The best of several ways.
     fn best(&self, ways: &[Way]) -> Registration {
         let mut pairs: Vec<PlacePair> = Vec::new();
-        let mut best = Registration { matched: 0, share: 0.0, ..self.registrar.as_it_stands(self.suspect) };
+        let mut best = self.nothing("identity");
         for way in ways {
             let costly = matches!(way, Way::Lines | Way::Points);
             if best.agrees() || costly && best.agrees_in_part() {
@@ -222,7 +227,25 @@ impl Search<'_> {
                 best = next;
             }
         }
+        if self.is_chance(&best) {
+            return self.nothing(best.method);
+        }
         self.bend(&best, &pairs).unwrap_or(best)
+    }
+
+    /// Whether about as many vertices match when the suspect is certainly not in place.
+    fn is_chance(&self, found: &Registration) -> bool {
+        let (unit, radius_m) = (self.registrar.unit(), self.registrar.radius_m);
+        let [a, b, c, d, e, f] = found.affine;
+        let [x, y] = [0, 1].map(|axis| OUT_OF_PLACE[axis] * radius_m / unit[axis].max(f64::MIN_POSITIVE));
+        let shifted = Affine { coefficients: [a, b, c + x, d, e, f + y] };
+        let chance = self.matched(shifted.into(), radius_m).from.len();
+        found.matched < LEAST_MATCHED || found.matched < TIMES_CHANCE * chance
+    }
+
+    fn nothing(&self, method: &'static str) -> Registration {
+        let as_it_stands = self.registrar.as_it_stands(self.suspect);
+        Registration { method, matched: 0, share: 0.0, ..as_it_stands }
     }
 
     /// One way; pairs of places that it went by are added to `pairs`.
@@ -262,8 +285,7 @@ impl Search<'_> {
         let [x_scale, y_scale] = self.registrar.unit();
         let metres = Affine { coefficients: [x_scale, 0.0, 0.0, 0.0, y_scale, 0.0] };
         let plain = |vertices: &VertexTable| star(vertices, metres);
-        let whitened =
-            candidates(white(reference.vertices), white(suspect.vertices), Arrangement::Star);
+        let whitened = candidates(white(reference.vertices), white(suspect.vertices), Arrangement::Star);
         if whitened.agrees_in_part() {
             return whitened;
         }
@@ -272,16 +294,14 @@ impl Search<'_> {
     }
 
     /// The best of several affine maps, each refined. Without any, the identity, and nothing matches.
-    fn best_start(&self, method: &'static str, starts: impl Iterator<Item = (Affine, usize)>) -> Registration {
+    fn best_start(
+        &self,
+        method: &'static str,
+        starts: impl Iterator<Item = (Affine, usize)>,
+    ) -> Registration {
         let refined = starts.map(|(affine, agree)| self.refine(method, affine, agree));
         let best = refined.reduce(|best, next| if next.matched > best.matched { next } else { best });
-        let nothing = || Registration {
-            method,
-            matched: 0,
-            share: 0.0,
-            ..self.registrar.as_it_stands(self.suspect)
-        };
-        best.unwrap_or_else(nothing)
+        best.unwrap_or_else(|| self.nothing(method))
     }
 
     /// Improves an affine map on the vertices that match under it.
@@ -306,7 +326,9 @@ impl Search<'_> {
             let fit = Affine::fit(&polished.from, &polished.to, &vec![1.0; polished.from.len()]);
             let Some(affine) = fit else { break };
             let next = self.matched(affine.into(), self.registrar.radius_m);
-            if (next.from.len() as f64) < least {
+            // Where nothing moved, rounding must not move it.
+            let closer = next.from.len() != polished.from.len() || next.rms_m < polished.rms_m;
+            if (next.from.len() as f64) < least || !closer {
                 break;
             }
             polished = next;
@@ -316,7 +338,7 @@ impl Search<'_> {
 
     /// Adds a cubic polynomial, where that matches clearly more vertices than the affine map alone.
     fn bend(&self, flat: &Registration, pairs: &[PlacePair]) -> Option<Registration> {
-        if flat.share >= ALMOST_ALL || flat.matched < LEAST_MATCHED {
+        if flat.share >= ALMOST_ALL {
             return None;
         }
         let (registrar, vertices) = (self.registrar, self.registrar.reference.vertices);
@@ -347,13 +369,7 @@ impl Search<'_> {
     }
 
     /// Follows a distortion from pairs of places to all vertices it can reach.
-    fn bend_from(
-        &self,
-        affine: Affine,
-        frame: Cubic,
-        from: &[[f64; 2]],
-        to: &[[f64; 2]],
-    ) -> Option<Pairs> {
+    fn bend_from(&self, affine: Affine, frame: Cubic, from: &[[f64; 2]], to: &[[f64; 2]]) -> Option<Pairs> {
         let fit = |from: &[[f64; 2]], to: &[[f64; 2]]| {
             let flat: Vec<[f64; 2]> = from.iter().map(|p| affine.apply(*p)).collect();
             let enough = from.len() >= LEAST_FOR_CUBIC;

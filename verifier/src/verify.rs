@@ -9,7 +9,7 @@ use crate::{
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
-    registration::{LEAST_MATCHED, Registrar, Registration, Start},
+    registration::{LEAST_MATCHED, OUT_OF_PLACE, Registrar, Registration, Start, TIMES_CHANCE},
     report::{Report, VertexCounts},
 };
 use meshmark_core::{
@@ -167,7 +167,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         found: Err(unregistered(matches.count, reference.vertices.len(), chance, start)),
         decoys: None,
     };
-    if matches.count >= LEAST_MATCHED && matches.count >= 2 * chance {
+    if matches.count >= LEAST_MATCHED && matches.count >= TIMES_CHANCE * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
         let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
         let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress)?;
@@ -265,7 +265,7 @@ fn by_chance(
     radius_m: f64,
 ) -> usize {
     let unit = ground.metres_per_unit(centre);
-    let shift = [7.3 * radius_m / unit[0].max(f64::MIN_POSITIVE), -5.1 * radius_m / unit[1]];
+    let shift = [0, 1].map(|axis| OUT_OF_PLACE[axis] * radius_m / unit[axis].max(f64::MIN_POSITIVE));
     let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + shift[0], p[1] + shift[1]]).collect();
     matcher.all(&shifted, radius_m).count
 }

@@ -19,15 +19,20 @@ const KEY: usize = 2 * (SIZE - 1);
 /// Windows of the reference that are compared, the largest: they stand out from noise.
 const MOST_REFERENCE: usize = 60_000;
 /// Windows of the suspect that are looked up.
-const MOST_SUSPECT: usize = 1_200;
+const MOST_SUSPECT: usize = 1_000;
 /// A pair counts when the next best is this many times further away.
 const DISTINCT: f64 = 1.3;
 /// Pairs that are looked at for a consensus, the most distinct.
 const MOST_PAIRS: usize = 800;
 /// Pairs whose affine maps are tried in full.
 const MOST_REFITTED: usize = 8;
+/// Fewer pairs than this agree by chance.
+const LEAST_AGREEING: usize = 5;
 /// Vertices where a line turns by less than this angle, radians, are left out.
 const STRAIGHT: f64 = 0.01;
+
+/// The order of a window's vertices as they are kept.
+const PLAIN: [usize; SIZE] = [0, 1, 2, 3, 4, 5];
 
 /// Six neighbouring vertices.
 #[derive(Debug, Clone)]
@@ -39,7 +44,7 @@ pub struct Window {
     size: f64,
 }
 
-/// In which other orders the same vertices may be met in the suspect.
+/// How the vertices of a window lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrangement {
     /// Along a line, from either end.
@@ -58,7 +63,9 @@ pub fn of_shapes(shapes: &[Shape]) -> Vec<Window> {
             true => n,
             false => n + 1 - SIZE,
         };
-        let window = move |start: usize| Window::new(std::array::from_fn(|i| vertices[(start + i) % n]));
+        let window = move |start: usize| {
+            Window::new(std::array::from_fn(|i| vertices[(start + i) % n]), Arrangement::Line)
+        };
         (0..starts).filter_map(window).collect::<Vec<_>>()
     };
     let mut windows: Vec<Window> = shapes.par_iter().flat_map_iter(of_shape).collect();
@@ -112,7 +119,7 @@ pub fn of_points(points: &[[f64; 2]], metric: impl Fn([f64; 2]) -> [f64; 2] + Sy
         let centre = vertices[0];
         let angle = |v: &[f64; 2]| (v[1] - centre[1]).atan2(v[0] - centre[0]);
         vertices[1..].sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-        Window::new(vertices)
+        Window::new(vertices, Arrangement::Star)
     };
     points.par_iter().filter_map(window).collect()
 }
@@ -138,7 +145,7 @@ impl PointDistance for Place {
 
 impl Window {
     /// `None` when the vertices are on a line.
-    fn new(vertices: [[f64; 2]; SIZE]) -> Option<Self> {
+    fn new(vertices: [[f64; 2]; SIZE], arrangement: Arrangement) -> Option<Self> {
         let centre = centre(&vertices);
         let centred = vertices.map(|v| [v[0] - centre[0], v[1] - centre[1]]);
         let sum = |f: fn(&[f64; 2]) -> f64| centred.iter().map(f).sum::<f64>() / SIZE as f64;
@@ -152,7 +159,8 @@ impl Window {
         let b = xy / a;
         let c = (yy - b * b).sqrt();
         let white = centred.map(|v| [v[0] / a, (v[1] - b / a * v[0]) / c]);
-        Some(Window { vertices, white, size })
+        let order = arrangement.canonical(&white);
+        Some(Window { vertices: order.map(|i| vertices[i]), white: order.map(|i| white[i]), size })
     }
 
     /// The key of the vertices in another order, perhaps mirrored.
@@ -173,23 +181,24 @@ fn centre(vertices: &[[f64; 2]]) -> [f64; 2] {
 }
 
 impl Arrangement {
-    /// Orders in which a suspect's window may show a reference's, and whether a mirror goes with them.
-    fn orders(self) -> Vec<([usize; SIZE], bool)> {
-        let plain: [usize; SIZE] = std::array::from_fn(|i| i);
+    /// The order all maps agree on: from the end, or the neighbour, that is further out at unit covariance.
+    fn canonical(self, white: &[[f64; 2]; SIZE]) -> [usize; SIZE] {
+        let out = |i: usize| white[i][0].powi(2) + white[i][1].powi(2);
         match self {
-            Arrangement::Line => {
-                let mut reversed = plain;
-                reversed.reverse();
-                vec![(plain, false), (plain, true), (reversed, false), (reversed, true)]
-            }
+            Arrangement::Line if out(0) >= out(SIZE - 1) => PLAIN,
+            Arrangement::Line => std::array::from_fn(|i| SIZE - 1 - i),
             Arrangement::Star => {
-                let around = SIZE - 1;
-                let turned = |by: usize, mirrored: bool| {
-                    let at = |i: usize| 1 + if mirrored { (by + around - i) % around } else { (by + i) % around };
-                    (std::array::from_fn(|i| if i == 0 { 0 } else { at(i - 1) }), mirrored)
-                };
-                (0..2 * around).map(|i| turned(i % around, i >= around)).collect()
+                let furthest = (1..SIZE).max_by(|&a, &b| out(a).total_cmp(&out(b))).expect("five neighbours");
+                std::array::from_fn(|i| if i == 0 { 0 } else { 1 + (furthest + i - 2) % (SIZE - 1) })
             }
+        }
+    }
+
+    /// The order in which a mirrored map shows the same vertices.
+    fn mirrored(self) -> [usize; SIZE] {
+        match self {
+            Arrangement::Line => PLAIN,
+            Arrangement::Star => std::array::from_fn(|i| if i < 2 { i } else { SIZE + 1 - i }),
         }
     }
 }
@@ -260,7 +269,7 @@ pub fn candidates(
             let to: Vec<_> = agreeing.iter().flat_map(|pair| pair.to).collect();
             affine = Affine::fit_robustly(&from, &to, 0.01 / unit[0].max(unit[1]))?;
         }
-        Some((affine, count))
+        (count >= LEAST_AGREEING).then_some((affine, count))
     };
     let mut found: Vec<(Affine, usize)> = votes.iter().take(MOST_REFITTED).filter_map(refit).collect();
     found.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
@@ -286,10 +295,9 @@ fn spread(windows: Vec<Window>) -> Vec<Window> {
 
 /// Pairs of windows that are distinctly alike, the most distinct first.
 fn pairs(reference: &[Window], suspect: &[Window], arrangement: Arrangement) -> Vec<Pair> {
-    let plain: [usize; SIZE] = std::array::from_fn(|i| i);
-    let node = |(index, w): (usize, &Window)| Node { key: w.key(&plain, false), index: index as u32 };
+    let node = |(index, w): (usize, &Window)| Node { key: w.key(&PLAIN, false), index: index as u32 };
     let tree = RTree::bulk_load(reference.iter().enumerate().map(node).collect());
-    let orders = arrangement.orders();
+    let orders = [(PLAIN, false), (arrangement.mirrored(), true)];
     let pair = |window: &Window| {
         let mut nearest: Vec<(f64, u32, usize)> = Vec::new();
         for (i, (order, mirrored)) in orders.iter().enumerate() {
