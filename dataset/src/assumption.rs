@@ -32,22 +32,12 @@ impl Assumption {
     /// # Errors
     /// Coordinates that cannot be brought there.
     pub fn apply(&self, raw: &Survey, target: &CoordinateSystem) -> Result<Survey> {
-        let bring = |mut coords: Vec<[f64; 2]>| {
+        raw.brought(target, |mut coords| {
             if self.axes_swapped {
                 coords.iter_mut().for_each(|p| p.swap(0, 1));
             }
             reproject(&mut coords, Some(&self.crs), target, "of any name").map(|()| coords)
-        };
-        let vertices = VertexTable::new(bring(raw.vertices.coords().to_vec())?)?;
-        let places = bring(raw.labels.iter().map(|label| label.point).collect())?;
-        let in_shapes = bring(raw.shapes.iter().flat_map(|s| s.vertices.iter().copied()).collect())?;
-        let mut survey = Survey::in_crs(vertices, target)?;
-        survey.labels = raw.labels.clone();
-        survey.labels.iter_mut().zip(places).for_each(|(label, place)| label.point = place);
-        survey.shapes = raw.shapes.clone();
-        let all = survey.shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
-        all.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
-        Ok(survey)
+        })
     }
 }
 
