@@ -20,6 +20,7 @@ pub mod progress;
 pub mod reading;
 pub mod registration;
 pub mod report;
+mod search;
 mod shapes;
 pub mod survival;
 pub mod verify;

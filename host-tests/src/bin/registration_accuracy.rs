@@ -10,7 +10,7 @@ use geo::{CoordsIter, Geometry};
 use meshmark_core::vertices::VertexTable;
 use meshmark_host_tests::{
     attacks::{Map, Random, Result, crop, features, vertices},
-    table2::product::{Asked, Marking, Product, Registration, write_key},
+    table2::product::{Asked, Marking, Product, Profile, Registration, write_key},
 };
 use std::{
     path::{Path, PathBuf},
@@ -96,7 +96,8 @@ fn row(product: &Product, path: &Path, seed: u64, longest: &mut [f64]) -> Result
     let file = |name: &str| folder.path().join(name);
     let (key, record, marked) = (file("key.json"), file("record.json"), file("marked.gpkg"));
     write_key(&key, seed)?;
-    let marking = Marking { key: &key, recipient: "ACME GmbH", chip_rate: 2, precision: 0.001 };
+    let marking =
+        Marking { key: &key, recipient: "ACME GmbH", profile: Profile::repetition(2), precision: 0.001 };
     product.mark(path, &marked, &record, marking)?;
     let (reference, marked) = (Map::read(path)?, Map::read(&marked)?);
     let mut cells = Vec::new();
