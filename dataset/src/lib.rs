@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod assumption;
 mod crs;
 mod error;
 mod labels;
@@ -10,6 +11,7 @@ mod shapes;
 mod survey;
 pub mod wkb;
 
+pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
 pub use labels::{Dimension, Label};

@@ -78,6 +78,36 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// The same map with all its coordinates taken into another CRS by `bring`.
+    ///
+    /// # Errors
+    /// Those of `bring`, and a CRS in which metres mean nothing.
+    pub(crate) fn brought(
+        &self,
+        crs: &CoordinateSystem,
+        bring: impl Fn(Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>>,
+    ) -> Result<Survey> {
+        let (vertices, indices) = VertexTable::indexed(bring(self.vertices.coords().to_vec())?)?;
+        let moved = |segment: &[u32; 2]| segment.map(|v| indices[v as usize]);
+        let mut segments: Vec<[u32; 2]> = self
+            .segments
+            .iter()
+            .map(moved)
+            .filter(|[a, b]| a != b)
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        segments.sort_unstable();
+        segments.dedup();
+        let places = bring(self.labels.iter().map(|label| label.point).collect())?;
+        let in_shapes = bring(self.shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect())?;
+        let (mut labels, mut shapes) = (self.labels.clone(), self.shapes.clone());
+        labels.iter_mut().zip(places).for_each(|(label, place)| label.point = place);
+        let of_shapes = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
+        of_shapes.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
+        let ground = Some(crs::ground(Some(crs), &vertices)?);
+        Ok(Survey { vertices, segments, crs: Some(crs.clone()), ground, labels, shapes })
+    }
+
     /// Metres on the ground.
     ///
     /// # Errors
@@ -299,7 +329,7 @@ impl From<wkb::WkbError> for Visit {
 }
 
 /// Brings coordinates into `target`; those of a layer without a CRS are taken to be in it.
-fn reproject(
+pub(crate) fn reproject(
     coords: &mut [[f64; 2]],
     from: Option<&CoordinateSystem>,
     target: &CoordinateSystem,

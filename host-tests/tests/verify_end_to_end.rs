@@ -1,10 +1,12 @@
 //! Mark with `ogr2ogr`, do to the file what people do, verify with `meshmark verify`.
 
+use gdal::spatial_ref::SpatialRef;
+use geo::CoordsIter;
 use meshmark_host_tests::{
-    attacks::{Map, deformation, features, similarity},
+    attacks::{Map, deformation, features, reproject, similarity},
     plugin::{Host, Run, library},
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// `meshmark verify --json` with the host's key; `more` holds flags and, last, the suspect.
 fn verify(host: &Host, reference: &str, more: &[&str]) -> (Run, Value) {
@@ -171,6 +173,110 @@ fn a_suspect_in_another_crs_is_reprojected() {
         host.run("ogr2ogr", &["-t_srs", srs, "other.gpkg", "marked.gpkg", "-overwrite"]);
         matches(&host, "map.gpkg", &["--record", "acme.json", "other.gpkg"]);
     }
+}
+
+/// The marked map's coordinates in an EPSG CRS, perhaps y before x, under a label of another CRS or none.
+fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
+    let mut map = reproject::reproject(&Map::read(&host.path("marked.gpkg")).unwrap(), epsg, None).unwrap();
+    if swapped {
+        map = map.map_coords(|[x, y]| [y, x]);
+    }
+    let label = label.map(|epsg| SpatialRef::from_epsg(epsg).unwrap().to_wkt().unwrap());
+    map.layers.iter_mut().for_each(|layer| layer.crs = label.clone());
+    let _ = std::fs::remove_file(host.path("suspect.gpkg"));
+    map.write(&host.path("suspect.gpkg")).unwrap();
+}
+
+#[test]
+fn a_missing_crs_is_found_among_the_likely_ones() {
+    let host = marked("kotka.gpkg", &[]);
+    // Degrees, web maps, UTM, Finland's older grid, its GK27 grid.
+    for epsg in [4326, 3857, 32635, 2393, 3881] {
+        for swapped in [false, true] {
+            mislabelled(&host, epsg, swapped, None);
+            let report = matches(&host, "map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+            let read_as = json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped });
+            assert_eq!(report["registration"]["read_as"], read_as);
+            assert_eq!(report["registration"]["method"], "identity");
+        }
+    }
+    mislabelled(&host, 3067, false, None);
+    let report = matches(&host, "map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+    assert_eq!(report["registration"]["read_as"]["crs"], "EPSG:3067");
+}
+
+#[test]
+fn a_wrong_crs_is_seen_and_the_right_one_found() {
+    let host = marked("kotka.gpkg", &[]);
+    for (epsg, swapped, label) in [
+        (3067, false, 4326),
+        (4326, false, 3857),
+        (3857, false, 3067),
+        (32635, false, 32636),
+        (4326, true, 4326),
+        (2393, false, 3067),
+    ] {
+        mislabelled(&host, epsg, swapped, Some(label));
+        let report = matches(&host, "map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+        let read_as = json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped });
+        assert_eq!(report["registration"]["read_as"], read_as, "labelled EPSG:{label}");
+    }
+}
+
+#[test]
+fn the_assumed_crs_is_told_to_people_too() {
+    let host = marked("kotka.gpkg", &[]);
+    mislabelled(&host, 4326, true, None);
+    let command = library().with_file_name("meshmark");
+    let arguments = ["verify", "--explain", "--key", "key.json", "--reference", "map.gpkg", "suspect.gpkg"];
+    let text = host.run(command.to_str().unwrap(), &arguments).stdout;
+    assert!(text.contains("registration: identity, read as EPSG:4326 with x and y exchanged"), "{text}");
+    let sentence = "The suspect has no CRS; its coordinates were read as EPSG:4326 with x and y exchanged.";
+    assert!(text.contains(sentence), "{text}");
+}
+
+#[test]
+fn a_suspect_without_anything_or_elsewhere_is_inconclusive() {
+    let host = marked("kotka.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    let mut empty = map.clone();
+    empty.layers.iter_mut().for_each(|layer| layer.features.clear());
+    let elsewhere = features::drop_attributes(&Map::read(&host.path("map.gpkg")).unwrap());
+    let few =
+        elsewhere.map_geometries(|geometry| geometry.coords_iter().next().map(|c| geo::Point(c).into()));
+    let few = features::delete(&similarity::translate(&few, [5e4, 5e4]), 0.9, 1);
+    for (suspect, file) in [(empty, "empty.gpkg"), (few, "few_points_elsewhere.gpkg")] {
+        suspect.write(&host.path(file)).unwrap();
+        for registration in ["auto", "landmarks", "geometry", "none"] {
+            let flags = ["--record", "acme.json", "--registration", registration, file];
+            let (run, report) = verify(&host, "map.gpkg", &flags);
+            assert_eq!(
+                (run.code, &report["verdict"]),
+                (Some(3), &Value::from("inconclusive")),
+                "{}",
+                run.stderr
+            );
+            assert!(report["reason"].as_str().unwrap().contains("not registered"), "{report}");
+        }
+    }
+}
+
+#[test]
+fn vertices_as_points_carry_the_message() {
+    let host = marked("kotka.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    let points = |geometry: &geo::Geometry| {
+        let points = geometry.coords_iter().map(geo::Point::from).collect();
+        Some(geo::MultiPoint(points).into())
+    };
+    let turned = similarity::linear(
+        &map.map_geometries(points),
+        similarity::rotation(30.0),
+        similarity::About::Corner,
+    );
+    features::drop_attributes(&turned.unwrap()).write(&host.path("points.gpkg")).unwrap();
+    let report = matches(&host, "map.gpkg", &["--record", "acme.json", "points.gpkg"]);
+    assert_eq!(report["registration"]["method"], "geometry");
 }
 
 #[test]
