@@ -36,6 +36,10 @@ const SAMPLE_VERTICES: usize = 200;
 const LEAST_FOUND: usize = 30;
 /// A residual of more standard deviations than this weighs less (Huber 1964).
 const HUBER: f64 = 2.0;
+/// A residual of more standard deviations than this is no displacement of the vertex at all.
+const OUTLIER: f64 = 4.0;
+/// The law of the noise is read from residuals, which show it only when it is this many times the mark.
+const WEAK_MARK: f64 = 1.5;
 /// What a deformation must gain in log-likelihood to be believed.
 const WORTH_IT: f64 = 10.0;
 
@@ -66,6 +70,24 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// `observed` without the displacements that are no part of either deformation, mark or noise: vertices that
+    /// a cut or an edit made where no reference vertex went. The scale is the median of what the deformation
+    /// leaves, which a few of them do not move, and at least the mark's own.
+    pub fn without_outliers(&self, observed: &Observed, mark_m: f64) -> Vec<Option<[f64; 2]>> {
+        let rest =
+            |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [(o[0] - f[0]).abs(), (o[1] - f[1]).abs()]);
+        let rests: Vec<Option<[f64; 2]>> = observed.iter().zip(&self.displacement_m).map(rest).collect();
+        let mut sizes: Vec<f64> = rests.iter().flatten().flatten().copied().collect();
+        if sizes.is_empty() {
+            return observed.to_vec();
+        }
+        let middle = sizes.len() / 2;
+        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let most = OUTLIER * (median / 0.6745).max(mark_m); // the median of |N(0, 1)|
+        let fits = |r: &Option<[f64; 2]>| r.is_none_or(|r| r[0].max(r[1]) <= most);
+        observed.iter().zip(&rests).map(|(o, r)| o.filter(|_| fits(r))).collect()
+    }
+
     /// What to demodulate in place of `observed`: what the deformation leaves of every displacement goes
     /// through the [`NoiseLaw`] that fits, and the noise becomes as small as that makes it.
     pub fn shape_noise(
@@ -79,11 +101,11 @@ impl Prediction {
         let residuals: Vec<[f64; 2]> =
             observed.iter().zip(&self.displacement_m).filter_map(residual).collect();
         let law = NoiseLaw::of(residuals.as_flattened());
-        if law.exponent == 2.0 {
+        let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
+        if law.exponent == 2.0 || self.deformation.noise_m < WEAK_MARK * mark_m {
             return (observed.to_vec(), self);
         }
-        let share = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
-        let noise2 = law.variance_m2 - amplitude_m.powi(2) * share;
+        let noise2 = law.variance_m2 - mark_m.powi(2);
         self.deformation.noise_m = noise2.max(LEAST_NOISE_M.powi(2)).sqrt();
         let shaped = observed.iter().zip(&self.displacement_m).map(|(o, f)| {
             let axis = |o: &[f64; 2], a: usize| f[a] + law.apply(o[a] - f[a]);
@@ -91,6 +113,12 @@ impl Prediction {
         });
         (shaped.collect(), self)
     }
+}
+
+/// The standard deviation of the mark's displacement on one axis, metres: unit columns of E spread over n rows.
+pub fn mark_deviation_m(patches: &Patches, carriers: usize, amplitude_m: f64) -> f64 {
+    let per_vertex = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
+    amplitude_m * per_vertex.sqrt()
 }
 
 impl Deformation {
@@ -440,6 +468,22 @@ mod tests {
         for (predicted, observed) in prediction.displacement_m.iter().zip(observed.iter().flatten()) {
             assert!((predicted[0] - observed[0]).hypot(predicted[1] - observed[1]) < 1e-3);
         }
+    }
+
+    #[test]
+    fn a_few_wrong_matches_are_dropped_and_honest_displacements_stay() {
+        let patches = patches();
+        let mut observed = observed(&patches);
+        for wrong in [100, 301, 400] {
+            observed[wrong] = observed[wrong].map(|[x, y]| [x + 0.7, y - 0.7]);
+        }
+        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 0.02 };
+        let prediction = deformation.predict(&patches, &observed, 64, 0.001);
+        let kept = prediction.without_outliers(&observed, 0.01);
+        assert!([100, 301, 400].iter().all(|&wrong| kept[wrong].is_none()));
+        let (before, after) = (observed.iter().flatten().count(), kept.iter().flatten().count());
+        assert!(before - after <= 3 + before / 50, "{before} {after}");
+        assert_eq!(prediction.without_outliers(&[None; 600], 0.01), [None; 600]);
     }
 
     #[test]

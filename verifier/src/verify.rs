@@ -14,7 +14,7 @@ use crate::{
 };
 use meshmark_core::{
     carrier::Carrier,
-    deformation::{Deformation, Prediction},
+    deformation::{Deformation, Observed, Prediction, mark_deviation_m},
     demodulation::{self, Demodulation},
     ground::Ground,
     key::SecretKey,
@@ -304,12 +304,21 @@ impl Tracking<'_> {
     ) -> meshmark_core::Result<(Vec<Option<[f64; 2]>>, Prediction)> {
         let coords = self.reference.vertices.coords();
         let mut observed = self.displacements(&self.match_joined(coords, request.radius_m));
+        let amplitude_m = request.parameters.amplitude_m;
+        let mark_m = mark_deviation_m(self.patches, carriers, amplitude_m);
+        let fit = |observed: &Observed| {
+            let deformation = Deformation::estimate(self.patches, observed, carriers, &request.parameters)?;
+            Ok(deformation.predict(self.patches, observed, carriers, amplitude_m))
+        };
         let mut round = 1;
         loop {
-            let deformation = Deformation::estimate(self.patches, &observed, carriers, &request.parameters)?;
-            let amplitude_m = request.parameters.amplitude_m;
-            let prediction = deformation.predict(self.patches, &observed, carriers, amplitude_m);
-            if deformation.deviation_m == 0.0 || round == ROUNDS {
+            let mut prediction = fit(&observed)?;
+            if prediction.deformation.deviation_m == 0.0 || round == ROUNDS {
+                let kept = prediction.without_outliers(&observed, mark_m);
+                if kept != observed {
+                    prediction = fit(&kept)?;
+                    observed = kept;
+                }
                 return Ok(prediction.shape_noise(self.patches, &observed, carriers, amplitude_m));
             }
             observed = self.displacements(&self.match_around(&prediction, request.radius_m));
