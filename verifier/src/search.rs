@@ -137,9 +137,17 @@ impl Search<'_> {
         method: &'static str,
         starts: impl Iterator<Item = (Affine, usize)>,
     ) -> Registration {
-        let refined = starts.map(|(affine, agree)| self.refine(method, affine, agree));
-        let best = refined.reduce(|best, next| if next.matched > best.matched { next } else { best });
-        best.unwrap_or_else(|| self.nothing(method))
+        let mut best = self.nothing(method);
+        for (affine, agree) in starts {
+            let next = self.refine(method, affine, agree);
+            if next.matched > best.matched {
+                best = next;
+            }
+            if best.agrees() {
+                break;
+            }
+        }
+        best
     }
 
     /// Improves an affine map on the vertices that match under it.
@@ -150,7 +158,12 @@ impl Search<'_> {
             let trial = self.matched(best.transform, factor * radius_m);
             let fit = Affine::fit_robustly(&trial.from, &trial.to, self.registrar.centimetre());
             let Some(affine) = fit else { break };
-            best = best.or_better(self.matched(affine.into(), radius_m));
+            let next = self.matched(affine.into(), radius_m);
+            let settled = factor == 1.0 && next.from.len() <= best.from.len();
+            best = best.or_better(next);
+            if settled {
+                break;
+            }
         }
         self.registration(method, landmarks, &self.polish(best))
     }
