@@ -62,13 +62,13 @@ MESHMARK_CONST OGRLayer *MeshmarkOutputDataset::GetLayer(int index) MESHMARK_CON
 
 int MeshmarkOutputDataset::TestCapability(const char *capability) MESHMARK_CONST
 {
-    for (const char *ours : {ODsCTransactions, ODsCRandomLayerWrite})
+    // A layer that cannot be created must be heard of: ogr2ogr -skipfailures goes on without asking for it.
+    for (const char *ours : {ODsCCreateLayer, ODsCTransactions, ODsCRandomLayerWrite})
     {
         if (EQUAL(capability, ours))
             return TRUE;
     }
-    for (const char *handed_on : {ODsCCreateLayer, ODsCCurveGeometries, ODsCMeasuredGeometries, ODsCZGeometries,
-                                  ODsCAddFieldDomain})
+    for (const char *handed_on : {ODsCCurveGeometries, ODsCMeasuredGeometries, ODsCZGeometries, ODsCAddFieldDomain})
     {
         if (EQUAL(capability, handed_on))
             return m_schema && m_schema->TestCapability(capability);

@@ -22,6 +22,9 @@ unsafe extern "C" {
     fn meshmark_shim_list_as_json(feature: OGRFeatureH, field: c_int) -> *mut c_char;
 }
 
+/// The configuration option for checking creation options.
+const VALIDATE: &CStr = c"GDAL_VALIDATE_CREATION_OPTIONS";
+
 /// What a layer is created with.
 pub struct LayerSpec {
     /// Its name.
@@ -236,15 +239,22 @@ impl Output {
         let mut list: Vec<*mut c_char> = options.iter().map(|o| o.as_ptr().cast_mut()).collect();
         list.push(ptr::null_mut());
         let collector = Collector::new();
-        // SAFETY: the dataset is open, the list ends in null, and GDAL changes no option.
+        // SAFETY: the dataset is open, the list ends in null, and GDAL changes no option; the configuration option
+        // is restored. GDAL has checked the options already when the host created the layer.
         let layer = unsafe {
-            gdal_sys::GDALDatasetCreateLayer(
+            let before = gdal_sys::CPLGetThreadLocalConfigOption(VALIDATE.as_ptr(), ptr::null());
+            let before = (!before.is_null()).then(|| CStr::from_ptr(before).to_owned());
+            gdal_sys::CPLSetThreadLocalConfigOption(VALIDATE.as_ptr(), c"NO".as_ptr());
+            let layer = gdal_sys::GDALDatasetCreateLayer(
                 self.dataset,
                 name.as_ptr(),
                 spec.srs.0,
                 spec.geometry,
                 list.as_mut_ptr(),
-            )
+            );
+            let before = before.as_ref().map_or(ptr::null(), |value| value.as_ptr());
+            gdal_sys::CPLSetThreadLocalConfigOption(VALIDATE.as_ptr(), before);
+            layer
         };
         if layer.is_null() {
             return Err(failure(format!("creating layer \"{}\"", spec.name), &collector));

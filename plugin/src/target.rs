@@ -43,28 +43,32 @@ pub struct Places {
 }
 
 impl Target {
-    /// Checks the names of target and reference.
+    /// Finds the places of the target and the reference. What is there now may go when the workplaces are made.
     pub fn new(name: &str, creation: &Creation) -> Result<Self> {
         let format = Format::find(creation.format.as_deref(), Path::new(name))?;
         let path = place(Path::new(name))?;
-        if path.is_file() {
-            match creation.overwrite {
-                false => return Err(exists(&path, "give another name, or say OVERWRITE=YES")),
-                true => check_not_busy(&path)?,
-            }
-        }
         let reference = Path::new(&creation.reference_path);
         if !reference.extension().is_some_and(|e| e.eq_ignore_ascii_case("gpkg")) {
             return Err(Error::ReferenceNotGeoPackage(creation.reference_path.clone()));
         }
         let reference = place(reference)?;
-        if reference.is_file() {
-            return Err(exists(&reference, "other copies may depend on this REFERENCE, so give another name"));
-        }
         if reference == path {
             return Err(Error::SameFile { option: "REFERENCE", other: "the target" });
         }
         Ok(Target { name: name.into(), path, format, reference, replaces: creation.overwrite })
+    }
+
+    /// Fails when something is in the way.
+    fn check_free(&self) -> Result<()> {
+        let exists = |path: &Path, remedy| Err(Error::Exists { path: path.display().to_string(), remedy });
+        if self.reference.exists() {
+            return exists(&self.reference, "other copies may depend on this REFERENCE, so give another name");
+        }
+        match (self.path.exists(), self.replaces) {
+            (false, _) => Ok(()),
+            (true, false) => exists(&self.path, "give another name, or say OVERWRITE=YES"),
+            (true, true) => check_not_busy(&self.path),
+        }
     }
 
     /// The name of the file, without folders.
@@ -72,7 +76,7 @@ impl Target {
         self.path.file_name().expect("a place has a name")
     }
 
-    /// Makes the workplaces.
+    /// Makes the workplaces, which removes what killed processes left, and checks that nothing is in the way.
     pub fn places(&self, request: &Request) -> Result<Places> {
         if same_file(&self.path, request.key_path()) {
             return Err(Error::SameFile { option: "KEY", other: "the target" });
@@ -103,6 +107,7 @@ impl Target {
             Some(to) => Some((stage(&to, "record.json")?, to)),
             None => None,
         };
+        self.check_free()?;
         Ok(Places { staged, record, main, _others: others })
     }
 
@@ -124,10 +129,6 @@ impl Target {
         let paths = names.into_iter().map(|name| self.path.with_file_name(name));
         Ok(paths.filter(|path| *path != self.path && path.is_file()).collect())
     }
-}
-
-fn exists(path: &Path, remedy: &'static str) -> Error {
-    Error::Exists { path: path.display().to_string(), remedy }
 }
 
 fn folder(path: &Path) -> &Path {
@@ -176,31 +177,32 @@ fn check_not_busy(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn target(folder: &Path, name: &str, reference: &str, overwrite: bool) -> Result<Target> {
+    /// What is wrong with a target, if anything.
+    fn fault(folder: &Path, name: &str, reference: &str, overwrite: bool) -> String {
         let path = |name: &str| folder.join(name).display().to_string();
         let creation = Creation { reference_path: path(reference), format: None, overwrite };
-        Target::new(&path(name), &creation)
+        let free = Target::new(&path(name), &creation).and_then(|target| target.check_free());
+        free.map_or_else(|error| error.to_string(), |()| String::new())
     }
 
     #[test]
     fn only_a_new_file_or_one_that_may_be_replaced_is_a_target() {
         let home = tempfile::tempdir().unwrap();
-        let folder = home.path();
         for name in ["old.gpkg", "busy.gpkg", "busy.gpkg-wal"] {
-            fs::write(folder.join(name), "x").unwrap();
+            fs::write(home.path().join(name), "x").unwrap();
         }
-        fs::create_dir(folder.join("sub.gpkg")).unwrap();
-        std::os::unix::fs::symlink(folder.join("nowhere.gpkg"), folder.join("dangling.gpkg")).unwrap();
-        let error = |name, reference, overwrite| target(folder, name, reference, overwrite).err().unwrap().to_string();
-        assert!(target(folder, "new.gpkg", "ref.gpkg", false).is_ok());
-        assert!(target(folder, "old.gpkg", "ref.gpkg", true).is_ok());
-        assert!(error("old.gpkg", "ref.gpkg", false).contains("OVERWRITE=YES"));
-        assert!(error("new.gpkg", "old.gpkg", true).contains("other copies may depend"));
-        assert!(error("busy.gpkg", "ref.gpkg", true).contains("busy.gpkg-wal"));
-        assert!(error("sub.gpkg", "ref.gpkg", true).contains("is a folder"));
-        assert!(error("dangling.gpkg", "ref.gpkg", true).contains("link to nowhere"));
-        assert!(error("no/new.gpkg", "ref.gpkg", true).contains("in no folder that exists"));
-        assert!(error("new.gpkg", "new.gpkg", false).contains("same file"));
-        assert!(error("new.gpkg", "ref.shp", false).contains("ends in .gpkg"));
+        fs::create_dir(home.path().join("sub.gpkg")).unwrap();
+        std::os::unix::fs::symlink("nowhere.gpkg", home.path().join("dangling.gpkg")).unwrap();
+        let fault = |name, reference, overwrite| fault(home.path(), name, reference, overwrite);
+        assert_eq!(fault("new.gpkg", "ref.gpkg", false), "");
+        assert_eq!(fault("old.gpkg", "ref.gpkg", true), "");
+        assert!(fault("old.gpkg", "ref.gpkg", false).contains("OVERWRITE=YES"));
+        assert!(fault("new.gpkg", "old.gpkg", true).contains("other copies may depend"));
+        assert!(fault("busy.gpkg", "ref.gpkg", true).contains("busy.gpkg-wal"));
+        assert!(fault("sub.gpkg", "ref.gpkg", true).contains("is a folder"));
+        assert!(fault("dangling.gpkg", "ref.gpkg", true).contains("link to nowhere"));
+        assert!(fault("no/new.gpkg", "ref.gpkg", true).contains("in no folder that exists"));
+        assert!(fault("new.gpkg", "new.gpkg", false).contains("same file"));
+        assert!(fault("new.gpkg", "ref.shp", false).contains("ends in .gpkg"));
     }
 }
