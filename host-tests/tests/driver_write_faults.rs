@@ -123,10 +123,10 @@ fn a_feature_that_the_format_refuses_stops_everything() {
 fn a_feature_that_fails_is_never_skipped() {
     let host = Host::new();
     // Two layers into one, with the same ids: every feature of the second fails.
-    let more = ["buildings", "landuse", "-nln", "both", "-nlt", "GEOMETRY", "-preserve_fid", "-append"];
-    let create = |more: &[&str]| fails(&host, "out.gpkg", &source("kotka.gpkg"), more, &["UNIQUE constraint"]);
-    for option in [&["-skipfailures"][..], &["-gt", "1"], &["-gt", "0"], &["-gt", "7", "-skipfailures"]] {
-        create(&[&more[..7], option].concat());
+    let more = ["buildings", "landuse", "-nln", "both", "-nlt", "GEOMETRY", "-preserve_fid"];
+    for option in [&["-skipfailures"][..], &["-gt", "1"], &["-gt", "7", "-skipfailures"]] {
+        let more = [&more[..], option].concat();
+        fails(&host, "out.gpkg", &source("kotka.gpkg"), &more, &["UNIQUE constraint"]);
     }
 }
 
@@ -134,10 +134,13 @@ fn a_feature_that_fails_is_never_skipped() {
 fn transactions_of_any_size_make_the_same_map() {
     let host = Host::new();
     let mut seen = Vec::new();
-    for size in ["0", "1", "100", "unlimited"] {
+    fails(&host, "out.gpkg", &source("kotka.gpkg"), &["-gt", "0"], &["MESHMARK:out.gpkg"]); // as with any database
+    for size in ["1", "100", "unlimited"] {
         host.create("out.gpkg", &source("kotka.gpkg"), &["-gt", size]).succeeds();
         seen.push(meshmark_host_tests::contents::read(&host.path("out.gpkg")));
-        ["out.gpkg", "ref.gpkg", "record.json"].map(|name| fs::remove_file(host.path(name)).unwrap());
+        for name in ["out.gpkg", "ref.gpkg", "record.json"] {
+            fs::remove_file(host.path(name)).unwrap();
+        }
     }
     assert!(seen.windows(2).all(|pair| pair[0] == pair[1]));
 }

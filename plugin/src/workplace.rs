@@ -10,11 +10,11 @@ use crate::{
 };
 use std::{
     ffi::OsStr,
-    fs::{self, File, TryLockError},
+    fs::{self, File, Permissions, TryLockError},
     io,
     os::unix::{
         ffi::OsStrExt,
-        fs::MetadataExt,
+        fs::{MetadataExt, PermissionsExt},
     },
     path::{Path, PathBuf},
 };
@@ -36,7 +36,10 @@ impl Workplace {
         let failed = |e: io::Error| file_error("writing into", parent, e);
         let parent = parent.canonicalize().map_err(failed)?;
         loop {
-            let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(&parent).map_err(failed)?.keep();
+            // What is staged is unmarked: it is nobody else's to read.
+            let private = Permissions::from_mode(0o700);
+            let folder = tempfile::Builder::new().prefix(PREFIX).permissions(private).tempdir_in(&parent);
+            let folder = folder.map_err(failed)?.keep();
             match lock(&folder) {
                 Ok(Some(lock)) => {
                     sweep(&parent, folder.metadata().map_err(failed)?.uid());
@@ -104,12 +107,11 @@ fn sweep_one(folder: &Path, user: u32) {
     if !is_workplace || !folder.symlink_metadata().is_ok_and(is_ours) {
         return;
     }
-    let file = match File::open(folder.join(LOCK)) {
-        Ok(file) => file,
-        Err(_) => {
-            drop(fs::remove_dir(folder)); // if it is empty: killed before it was locked
-            return;
-        }
+    // Without a lock it is empty, and perhaps about to be locked, or its owner died while removing it.
+    let lock = || File::open(folder.join(LOCK)).ok();
+    let Some(file) = lock().or_else(|| if fs::remove_dir(folder).is_err() { lock() } else { None }) else {
+        drop(fs::remove_dir_all(folder));
+        return;
     };
     if file.try_lock().is_err() {
         return;
@@ -155,8 +157,7 @@ mod tests {
         }
         drop(workplace);
         fs::rename(&copy, &folder).unwrap();
-        let private = std::os::unix::fs::PermissionsExt::from_mode(0o700);
-        fs::set_permissions(&folder, private).unwrap();
+        fs::set_permissions(&folder, Permissions::from_mode(0o700)).unwrap();
         folder
     }
 
@@ -166,9 +167,12 @@ mod tests {
         let running = Workplace::new(parent.path()).unwrap();
         let left = abandon(Workplace::new(parent.path()).unwrap());
         fs::write(left.join("big"), "x").unwrap();
-        fs::create_dir(parent.path().join(".meshmark-write-empty")).unwrap();
-        let private = std::os::unix::fs::PermissionsExt::from_mode(0o700);
-        fs::set_permissions(parent.path().join(".meshmark-write-empty"), private).unwrap();
+        for name in [".meshmark-write-empty", ".meshmark-write-unlocked"] {
+            let folder = abandon(Workplace::new(parent.path()).unwrap());
+            fs::remove_file(folder.join(LOCK)).unwrap();
+            fs::rename(&folder, parent.path().join(name)).unwrap();
+        }
+        fs::write(parent.path().join(".meshmark-write-unlocked/rest"), "killed while it was removed").unwrap();
         fs::create_dir(parent.path().join("other")).unwrap();
         let next = Workplace::new(parent.path()).unwrap();
         assert!(running.folder.exists() && next.folder.exists() && !left.exists());
