@@ -52,10 +52,16 @@ impl Scene {
         fs::write(host.path("in.geojson"), points(400, "")).unwrap();
         let preload = host.plugins().join("fault.so");
         compile(&preload);
-        let mut options: Vec<String> =
-            ["-dsco", "PATCH_SIZE=130", "-dsco", "MESSAGE=0123456789abcdef0123456789abcdef", "-dsco", "CHIP_RATE=1"]
-                .map(String::from)
-                .into();
+        let mut options: Vec<String> = [
+            "-dsco",
+            "PATCH_SIZE=130",
+            "-dsco",
+            "MESSAGE=0123456789abcdef0123456789abcdef",
+            "-dsco",
+            "CHIP_RATE=1",
+        ]
+        .map(String::from)
+        .into();
         let before = replaces.then(|| {
             let format = if target.ends_with(".shp") { "ESRI Shapefile" } else { "GPKG" };
             host.run("ogr2ogr", &["-f", format, target, "in.geojson", "-nln", "before"]).succeeds();
@@ -77,14 +83,21 @@ impl Scene {
             _ => ("none", String::new()),
         };
         let before: Vec<String> = match fault {
-            Some(Fault::KillAfter(seconds)) => vec!["timeout".into(), "-s".into(), "KILL".into(), seconds.to_string()],
+            Some(Fault::KillAfter(seconds)) => {
+                vec!["timeout".into(), "-s".into(), "KILL".into(), seconds.to_string()]
+            }
             Some(Fault::FileSize(bytes)) => vec!["sh".into(), "-c".into(), limited(bytes), "sh".into()],
             _ => Vec::new(),
         };
-        let line: Vec<&str> =
-            before.iter().map(String::as_str).chain(["ogr2ogr"]).chain(arguments.iter().map(String::as_str)).collect();
+        let line: Vec<&str> = before
+            .iter()
+            .map(String::as_str)
+            .chain(["ogr2ogr"])
+            .chain(arguments.iter().map(String::as_str))
+            .collect();
         let (preload, log) = (self.preload.display().to_string(), self.log().display().to_string());
-        let variables = [("LD_PRELOAD", preload.as_str()), ("FAULT", kind), ("FAULT_AT", &at), ("FAULT_LOG", &log)];
+        let variables =
+            [("LD_PRELOAD", preload.as_str()), ("FAULT", kind), ("FAULT_AT", &at), ("FAULT_LOG", &log)];
         // Shells and timers shall not fail, only the host.
         let variables = if before.is_empty() { &variables[..] } else { &[] };
         self.host.run_with(line[0], &line[1..], variables)

@@ -154,7 +154,8 @@ fn a_map_without_numbers_of_its_own_gets_those_of_the_format() {
     let host = Host::new();
     host.create("out.shp", &source("kotka.gpkg"), &["buildings", "-unsetFid"]).succeeds();
     let first = contents::read(&host.path("out.shp"))[0].features[0].fid;
-    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "native.shp", &source("kotka.gpkg"), "buildings"]).succeeds();
+    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "native.shp", &source("kotka.gpkg"), "buildings"])
+        .succeeds();
     assert_eq!(first, contents::read(&host.path("native.shp"))[0].features[0].fid);
 }
 
@@ -215,7 +216,11 @@ fn a_file_that_is_there_is_replaced_only_when_that_is_said() {
     host.matches("ref.gpkg", &["--record", "record.json", "out.gpkg"]);
 
     let again = ["-dsco", "OVERWRITE=YES", "-dsco", "RECORD=again.json"];
-    refuses(&host, || host.create("out.gpkg", &kotka, &again), &["ref.gpkg exists", "other copies may depend"]);
+    refuses(
+        &host,
+        || host.create("out.gpkg", &kotka, &again),
+        &["ref.gpkg exists", "other copies may depend"],
+    );
     let again = [&again[..], &["-dsco", "REFERENCE=again.gpkg", "-dsco", "RECIPIENT=B"]].concat();
     host.create("out.gpkg", &kotka, &again).succeeds();
     host.matches("again.gpkg", &["--record", "again.json", "out.gpkg"]);
@@ -225,8 +230,11 @@ fn a_file_that_is_there_is_replaced_only_when_that_is_said() {
 fn all_files_of_a_shapefile_are_replaced_together() {
     let host = Host::new();
     let astana = source("astana.gpkg");
-    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "out.shp", &astana, "buildings", "-lco", "SPATIAL_INDEX=YES"])
-        .succeeds();
+    host.run(
+        "ogr2ogr",
+        &["-f", "ESRI Shapefile", "out.shp", &astana, "buildings", "-lco", "SPATIAL_INDEX=YES"],
+    )
+    .succeeds();
     assert!(host.path("out.qix").exists());
     fs::write(host.path("out.txt"), "a note that is no part of it").unwrap();
     host.create("out.shp", &source("kotka.gpkg"), &["buildings", "-dsco", "OVERWRITE=YES"]).succeeds();
@@ -241,7 +249,8 @@ fn a_marked_map_cannot_be_extended_and_the_target_stays_as_it_was() {
     for mode in ["-append", "-update", "-overwrite"] {
         let host = Host::new();
         host.create("out.gpkg", &kotka, &[]).succeeds();
-        let more = ["-dsco", "REFERENCE=second.gpkg", "-dsco", "RECORD=second.json", "-dsco", "OVERWRITE=YES", mode];
+        let more =
+            ["-dsco", "REFERENCE=second.gpkg", "-dsco", "RECORD=second.json", "-dsco", "OVERWRITE=YES", mode];
         refuses(&host, || host.create("out.gpkg", &kotka, &more), &["cannot be extended", "leave -append"]);
         refuses(&host, || host.create("new.gpkg", &kotka, &more), &["cannot be extended"]);
     }
@@ -273,7 +282,8 @@ fn what_is_missing_or_collides_is_named() {
     let plain = ["-f", "MESHMARK", "MESHMARK:out.gpkg", &kotka, "-dsco", "KEY=key.json"];
     let named = [&plain[..], &["-dsco", "RECIPIENT=A"]].concat();
     refuses(&host, || host.run("ogr2ogr", &named), &["there is no REFERENCE"]);
-    let refuse = |more: &[&str], words: &[&str]| refuses(&host, || host.create("out.gpkg", &kotka, more), words);
+    let refuse =
+        |more: &[&str], words: &[&str]| refuses(&host, || host.create("out.gpkg", &kotka, more), words);
     refuse(&["-dsco", "REFERENCE=ref.shp"], &["ref.shp", ".gpkg"]);
     refuse(&["-dsco", "REFERENCE=out.gpkg"], &["REFERENCE and the target"]);
     refuse(&["-dsco", "RECORD=out.gpkg"], &["RECORD and the target"]);

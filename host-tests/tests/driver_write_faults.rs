@@ -115,8 +115,13 @@ fn a_place_that_cannot_be_written_to_is_named_before_anything_is_read() {
 #[test]
 fn a_feature_that_the_format_refuses_stops_everything() {
     let host = Host::new();
-    fails(&host, "out.shp", &source("shapes.gpkg"), &["mixed", "-dsco", "PATCH_SIZE=16", "-dsco", "CHIP_RATE=1",
-        "-dsco", "MESSAGE=0a"], &["MESHMARK:out.shp"]);
+    fails(
+        &host,
+        "out.shp",
+        &source("shapes.gpkg"),
+        &["mixed", "-dsco", "PATCH_SIZE=16", "-dsco", "CHIP_RATE=1", "-dsco", "MESSAGE=0a"],
+        &["MESHMARK:out.shp"],
+    );
 }
 
 #[test]
@@ -148,8 +153,11 @@ fn transactions_of_any_size_make_the_same_map() {
 #[test]
 fn a_source_that_ends_early_makes_no_map() {
     let host = Host::new();
-    host.run("ogr2ogr", &["-f", "FlatGeobuf", "in.fgb", &source("kotka.gpkg"), "buildings", "-lco", "SPATIAL_INDEX=NO"])
-        .succeeds();
+    host.run(
+        "ogr2ogr",
+        &["-f", "FlatGeobuf", "in.fgb", &source("kotka.gpkg"), "buildings", "-lco", "SPATIAL_INDEX=NO"],
+    )
+    .succeeds();
     let bytes = fs::read(host.path("in.fgb")).unwrap();
     fs::write(host.path("in.fgb"), &bytes[..bytes.len() - bytes.len() / 8]).unwrap();
     for size in ["0", "1", "100000"] {
@@ -167,7 +175,11 @@ fn without_the_prefix_nothing_marked_is_written_and_a_new_file_is_refused() {
     let arguments = ["-f", "MESHMARK", "out.gpkg", &kotka, "-dsco", "KEY=key.json", "-dsco", "RECIPIENT=A"];
     let run = host.run("ogr2ogr", &arguments);
     assert_eq!(run.code, Some(1));
-    assert!(run.stderr.contains("write MESHMARK:") && run.stderr.contains("MESHMARK:out.gpkg"), "{}", run.stderr);
+    assert!(
+        run.stderr.contains("write MESHMARK:") && run.stderr.contains("MESHMARK:out.gpkg"),
+        "{}",
+        run.stderr
+    );
     assert!(host.files() == before);
 }
 
@@ -230,7 +242,15 @@ impl InProcess {
         // SAFETY: the driver is registered, the strings outlive the calls, zero bands mean vectors.
         let dataset = unsafe {
             let driver = gdal_sys::GDALGetDriverByName(c"MESHMARK".as_ptr());
-            gdal_sys::GDALCreate(driver, name.as_ptr(), 0, 0, 0, gdal_sys::GDALDataType::GDT_Unknown, list.as_mut_ptr())
+            gdal_sys::GDALCreate(
+                driver,
+                name.as_ptr(),
+                0,
+                0,
+                0,
+                gdal_sys::GDALDataType::GDT_Unknown,
+                list.as_mut_ptr(),
+            )
         };
         assert!(!dataset.is_null(), "{:?}", last_failure());
         Open { dataset, _host: self }
@@ -248,7 +268,8 @@ impl InProcess {
     fn wrote(&self, target: &str) {
         assert_eq!(last_failure(), None);
         let reference = format!("ref_{target}");
-        let how = ["--message", "0123456789abcdef0123456789abcdef", "--chip-rate", "1", "--patch-size", "130"];
+        let how =
+            ["--message", "0123456789abcdef0123456789abcdef", "--chip-rate", "1", "--patch-size", "130"];
         let (run, report) = self.host.verify(&reference, &[&how[..], &[target]].concat());
         assert_eq!((run.code, &report["bit_errors"]), (Some(0), &0.into()), "{}", run.stderr);
     }
@@ -281,7 +302,8 @@ impl Open<'_> {
             let srs = gdal_sys::OSRNewSpatialReference(ptr::null());
             gdal_sys::OSRImportFromEPSG(srs, 3067);
             let kind = OGRwkbGeometryType::wkbPoint;
-            let layer = gdal_sys::GDALDatasetCreateLayer(self.dataset, name.as_ptr(), srs, kind, ptr::null_mut());
+            let layer =
+                gdal_sys::GDALDatasetCreateLayer(self.dataset, name.as_ptr(), srs, kind, ptr::null_mut());
             gdal_sys::OSRRelease(srs);
             assert!(!layer.is_null(), "{:?}", last_failure());
             let field = gdal_sys::OGR_Fld_Create(c"name".as_ptr(), OGRFieldType::OFTString);
@@ -408,7 +430,7 @@ fn what_comes_into_being_meanwhile_is_not_overwritten() {
         open.points(open.layer(c"places"), None);
         fs::write(process.host.path(name), "somebody else's").unwrap();
         open.close();
-        assert!(last_failure().unwrap().contains("came into being meanwhile"));
+        assert!(last_failure().unwrap().contains("exists: move it away"));
         assert_eq!(process.host.names().len(), 2, "{:?}", process.host.names());
         assert_eq!(fs::read_to_string(process.host.path(name)).unwrap(), "somebody else's");
         fs::remove_file(process.host.path(name)).unwrap();

@@ -109,8 +109,7 @@ fn a_translated_rotated_scaled_copy_is_found_by_its_landmarks() {
         similarity::linear(&turned, similarity::scaling(5.5, 5.5), similarity::About::Corner).unwrap();
     similarity::translate(&scaled, [1000.0, -500.0]).write(&host.path("moved.gpkg")).unwrap();
     for landmark in [&[][..], &["--landmark", "name", "--landmark", "osm_id"][..]] {
-        let report =
-            host.matches("map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
+        let report = host.matches("map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
         assert_eq!(report["registration"]["method"], "landmarks");
         assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
         assert!(report["registration"]["rms_m"].as_f64().unwrap() < 0.12);

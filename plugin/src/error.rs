@@ -58,7 +58,9 @@ pub enum Error {
     RecordUnwritable { path: String, reason: String },
     #[error("no threads can be started ({0}): set GDAL_NUM_THREADS=1")]
     Threads(String),
-    #[error("it is no name to write to: write MESHMARK: and then the name of a file, for example MESHMARK:{0}")]
+    #[error(
+        "it is no name to write to: write MESHMARK: and then the name of a file, for example MESHMARK:{0}"
+    )]
     BareTarget(String),
     #[error("a marked map cannot be extended: leave -append, -update and -overwrite out{overwrite}")]
     Extended { overwrite: &'static str },

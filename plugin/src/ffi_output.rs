@@ -107,9 +107,7 @@ impl Field {
     pub unsafe fn read(field: OGRFieldDefnH) -> Self {
         // SAFETY: the definition is valid, its strings are null or C strings that are copied.
         unsafe {
-            let string = |s: *const c_char| {
-                (!s.is_null() && *s != 0).then(|| CStr::from_ptr(s).to_owned())
-            };
+            let string = |s: *const c_char| (!s.is_null() && *s != 0).then(|| CStr::from_ptr(s).to_owned());
             Field {
                 name: text(gdal_sys::OGR_Fld_GetNameRef(field)),
                 kind: gdal_sys::OGR_Fld_GetType(field),
@@ -139,7 +137,12 @@ impl Field {
             _ => false,
         };
         match kept {
-            true => Field { kind: self.kind, subkind: self.subkind, default: self.default.clone(), ..Field::text(name) },
+            true => Field {
+                kind: self.kind,
+                subkind: self.subkind,
+                default: self.default.clone(),
+                ..Field::text(name)
+            },
             false => Field::text(name),
         }
     }
@@ -198,7 +201,15 @@ impl Output {
             if handle.is_null() {
                 return Err(failure(format!("finding GDAL's driver {driver}"), &collector));
             }
-            gdal_sys::GDALCreate(handle, path_text.as_ptr(), 0, 0, 0, gdal_sys::GDALDataType::GDT_Unknown, ptr::null_mut())
+            gdal_sys::GDALCreate(
+                handle,
+                path_text.as_ptr(),
+                0,
+                0,
+                0,
+                gdal_sys::GDALDataType::GDT_Unknown,
+                ptr::null_mut(),
+            )
         };
         match dataset.is_null() {
             true => Err(failure(format!("creating a {driver} dataset"), &collector)),

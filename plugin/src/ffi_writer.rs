@@ -81,7 +81,9 @@ unsafe extern "C" fn meshmark_writer_refuse_update(name: *const c_char) {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_refuse_bare(name: *const c_char) {
     // SAFETY: the shim gives a C string.
-    guarded((), || unsafe { report(CPLErr::CE_Failure, format!("{}: {}", text(name), Error::BareTarget(text(name)))) });
+    guarded((), || unsafe {
+        report(CPLErr::CE_Failure, format!("{}: {}", text(name), Error::BareTarget(text(name))))
+    });
 }
 
 /// Creates a layer; the empty one of the real driver, or null.

@@ -45,7 +45,8 @@ impl Format {
         };
         found.ok_or_else(|| {
             let known: Vec<_> = FORMATS.iter().map(|format| format.driver).collect();
-            let what = named.map_or_else(|| format!("extension \"{extension}\""), |name| format!("FORMAT={name}"));
+            let what =
+                named.map_or_else(|| format!("extension \"{extension}\""), |name| format!("FORMAT={name}"));
             Error::UnknownFormat { what, known: known.join(", ") }
         })
     }

@@ -103,7 +103,11 @@ impl Publication {
 
     /// Kind, from, to; each ended by NUL, which no path contains.
     fn to_bytes(&self) -> Vec<u8> {
-        let lists = [("new", &self.companions[..]), ("old", &self.retired), ("main", std::slice::from_ref(&self.main))];
+        let lists = [
+            ("new", &self.companions[..]),
+            ("old", &self.retired),
+            ("main", std::slice::from_ref(&self.main)),
+        ];
         let mut bytes = Vec::new();
         for (kind, moves) in lists {
             for Move { from, to } in moves {
@@ -138,7 +142,8 @@ impl Publication {
 
 /// Undoes what a killed process published without its main file.
 pub fn recover(workplace: &Path) {
-    let publication = fs::read(workplace.join(JOURNAL)).ok().and_then(|bytes| Publication::from_bytes(&bytes));
+    let publication =
+        fs::read(workplace.join(JOURNAL)).ok().and_then(|bytes| Publication::from_bytes(&bytes));
     if let Some(publication) = publication.filter(|publication| !publication.is_done()) {
         publication.undo();
     }
@@ -148,7 +153,7 @@ pub fn recover(workplace: &Path) {
 fn link(Move { from, to }: &Move) -> Result<()> {
     fs::hard_link(from, to).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => {
-            Error::Exists { path: to.display().to_string(), remedy: "it came into being meanwhile" }
+            Error::Exists { path: to.display().to_string(), remedy: "move it away, or give another name" }
         }
         _ => file_error("making", to, error),
     })

@@ -197,7 +197,10 @@ mod tests {
     #[test]
     fn the_nearest_place_within_the_tolerance_is_found_or_none() {
         let places = vec![[0.0, 0.0], [0.04, 0.0], [0.0, 0.3], [5.0, 5.0]];
-        assert_eq!(find_all(&[[0.03, 0.0], [5.0, 5.0]], places.clone(), 0.05), Some(vec![[0.04, 0.0], [5.0, 5.0]]));
+        assert_eq!(
+            find_all(&[[0.03, 0.0], [5.0, 5.0]], places.clone(), 0.05),
+            Some(vec![[0.04, 0.0], [5.0, 5.0]])
+        );
         assert_eq!(find_all(&[[0.0, 0.1]], places.clone(), 0.05), None);
         assert_eq!(find_all(&[[0.0, 0.3]], places, 0.0), Some(vec![[0.0, 0.3]]));
     }

@@ -62,7 +62,10 @@ impl Target {
     fn check_free(&self) -> Result<()> {
         let exists = |path: &Path, remedy| Err(Error::Exists { path: path.display().to_string(), remedy });
         if self.reference.exists() {
-            return exists(&self.reference, "other copies may depend on this REFERENCE, so give another name");
+            return exists(
+                &self.reference,
+                "other copies may depend on this REFERENCE, so give another name",
+            );
         }
         match (self.path.exists(), self.replaces) {
             (false, _) => Ok(()),
@@ -121,7 +124,9 @@ impl Target {
         let mut names: Vec<OsString> = entries.flatten().map(|entry| entry.file_name()).collect();
         if names.len() > 1 {
             let stale = ["dbf", "shx", "prj", "cpg", "qix", "sbn", "sbx", "qpj", "idm", "ind"];
-            let of = |extension| self.path.with_extension(extension).file_name().unwrap_or_default().to_os_string();
+            let of = |extension| {
+                self.path.with_extension(extension).file_name().unwrap_or_default().to_os_string()
+            };
             names.extend(stale.into_iter().map(of));
         }
         names.sort();

@@ -172,7 +172,8 @@ mod tests {
             fs::remove_file(folder.join(LOCK)).unwrap();
             fs::rename(&folder, parent.path().join(name)).unwrap();
         }
-        fs::write(parent.path().join(".meshmark-write-unlocked/rest"), "killed while it was removed").unwrap();
+        fs::write(parent.path().join(".meshmark-write-unlocked/rest"), "killed while it was removed")
+            .unwrap();
         fs::create_dir(parent.path().join("other")).unwrap();
         let next = Workplace::new(parent.path()).unwrap();
         assert!(running.folder.exists() && next.folder.exists() && !left.exists());

@@ -92,7 +92,14 @@ impl Writer {
             writer.staged.add_layer(&spec.with_options(options.into()), true)?;
             let taken = [&id, &geometry, STYLE_COLUMN].map(str::to_lowercase).into();
             let (columns, lists) = (Vec::new(), Vec::new());
-            writer.layers.push(StagedLayer { spec, columns, lists, taken, style_column: None, has_ids: false });
+            writer.layers.push(StagedLayer {
+                spec,
+                columns,
+                lists,
+                taken,
+                style_column: None,
+                has_ids: false,
+            });
             let fields = writer.schema.fields(number);
             fields.iter().try_for_each(|field| writer.stage_field(number, field, &field.name))?;
             Ok(number)
@@ -120,7 +127,12 @@ impl Writer {
         }
         layer.taken.push(unique.to_lowercase());
         let column = self.staged.field_count(number);
-        self.staged.add_field(number, &field.staged(unique, self.target.format.driver == "GPKG"), true, true)?;
+        self.staged.add_field(
+            number,
+            &field.staged(unique, self.target.format.driver == "GPKG"),
+            true,
+            true,
+        )?;
         if field.is_list() {
             layer.lists.push(layer.columns.len());
         }
@@ -170,7 +182,13 @@ impl Writer {
 
     /// Marks, writes, reads back and publishes; `host_failure` is what the host reported before it closed the
     /// dataset. Returns what the user should read though nothing failed.
-    pub fn finish(self, described: &Described, host_failure: Option<String>, mark: Mark, threads: usize) -> Result<Vec<String>> {
+    pub fn finish(
+        self,
+        described: &Described,
+        host_failure: Option<String>,
+        mark: Mark,
+        threads: usize,
+    ) -> Result<Vec<String>> {
         if let Some(reason) = self.why_not(host_failure) {
             return Err(Error::Unfinished(reason));
         }
@@ -191,13 +209,14 @@ impl Writer {
         let warnings = view.marking().warnings.clone();
         let record = view.marking().record.clone();
         drop((view, schema));
-        publish(&target, &request, &places, &folder, &record)?;
+        publish(&target, &places, &folder, &record)?;
         Ok(warnings)
     }
 
     fn why_not(&self, host_failure: Option<String>) -> Option<String> {
         let open = (self.open_transactions > 0).then(|| "a transaction is still open".to_string());
-        let reported = host_failure.map(|reason| format!("a failure was reported before it was closed ({reason})"));
+        let reported =
+            host_failure.map(|reason| format!("a failure was reported before it was closed ({reason})"));
         self.failed.clone().or(open).or(reported)
     }
 }
@@ -281,7 +300,7 @@ fn write_marked(
 }
 
 /// Puts record, reference and the files in `folder` into their places.
-fn publish(target: &Target, request: &Request, places: &Places, folder: &Path, record: &str) -> Result<()> {
+fn publish(target: &Target, places: &Places, folder: &Path, record: &str) -> Result<()> {
     let mut publication = Publication { overwrite: target.replaces, ..Publication::default() };
     if let Some((staged, to)) = &places.record {
         fs::write(staged, record).map_err(|e| file_error("writing", staged, e))?;
@@ -293,7 +312,9 @@ fn publish(target: &Target, request: &Request, places: &Places, folder: &Path, r
     publication.companions.push(Move { from: places.staged.clone(), to: target.reference.clone() });
     let retired_folder = places.main.subfolder("old")?;
     for path in target.side_files(folder)? {
-        publication.retired.push(Move { to: retired_folder.join(path.file_name().unwrap_or_default()), from: path });
+        publication
+            .retired
+            .push(Move { to: retired_folder.join(path.file_name().unwrap_or_default()), from: path });
     }
     let entries = fs::read_dir(folder).map_err(|e| file_error("reading", folder, e))?;
     for entry in entries.flatten() {
@@ -306,6 +327,5 @@ fn publish(target: &Target, request: &Request, places: &Places, folder: &Path, r
             false => publication.companions.push(part),
         }
     }
-    debug_assert!(request.record_path().is_some() == places.record.is_some());
     publication.run(places.main.folder())
 }

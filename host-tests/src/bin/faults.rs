@@ -29,7 +29,8 @@ fn main() {
     });
     println!("seed {seed}");
     let mut random = ChaCha20Rng::seed_from_u64(seed);
-    for (target, replaces) in [("out.gpkg", false), ("out.gpkg", true), ("out.shp", true), ("out.fgb", false)] {
+    for (target, replaces) in [("out.gpkg", false), ("out.gpkg", true), ("out.shp", true), ("out.fgb", false)]
+    {
         let scene = Scene::new(target, replaces);
         let calls = scene.count_calls();
         let what = format!("{target}{}", if replaces { ", replacing another" } else { "" });
