@@ -62,7 +62,10 @@ pub enum Error {
         "it is no name to write to: write MESHMARK: and then the name of a file, for example MESHMARK:{0}"
     )]
     BareTarget(String),
-    #[error("a marked map cannot be extended: leave -append, -update and -overwrite out{overwrite}")]
+    #[error(
+        "it cannot be opened for update, as a marked map cannot be extended: leave -append, -update and -overwrite \
+         out{overwrite}"
+    )]
     Extended { overwrite: &'static str },
     #[error("{path} is {what}: a marked map is written to a file of its own, in a folder that exists")]
     NotAFile { path: String, what: &'static str },
