@@ -15,6 +15,12 @@ impl CoordinateSystem {
         CoordinateSystem(srs)
     }
 
+    /// The CRS of a layer; `None` where it says "undefined", as GeoPackages do that were written without one.
+    pub fn of_layer(srs: SpatialRef) -> Option<Self> {
+        let is_undefined = srs.name().is_some_and(|name| name.starts_with("Undefined "));
+        (!is_undefined).then(|| Self::new(srs))
+    }
+
     /// "EPSG:3067", or WKT when it has no code.
     pub fn label(&self) -> String {
         self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())

@@ -268,7 +268,7 @@ impl Walk<'_> {
             (None, given) => Ok(given.clone()),
         };
         let fields = layer.defn().geom_fields();
-        fields.map(|field| crs(field.spatial_ref().ok().map(CoordinateSystem::new))).collect()
+        fields.map(|field| crs(field.spatial_ref().ok().and_then(CoordinateSystem::of_layer))).collect()
     }
 
     /// Layers that share one mesh share one CRS.

@@ -166,6 +166,12 @@ fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
     map.write(&host.path("suspect.gpkg")).unwrap();
 }
 
+/// What the report says of these coordinates. EPSG:3067, the reference's own, is UTM zone 35 by another name.
+fn read_as(epsg: u32, swapped: bool) -> Value {
+    let epsg = if epsg == 32635 { 3067 } else { epsg };
+    json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped })
+}
+
 #[test]
 fn a_missing_crs_is_found_among_the_likely_ones() {
     let host = marked("kotka.gpkg", &[]);
@@ -174,8 +180,7 @@ fn a_missing_crs_is_found_among_the_likely_ones() {
         for swapped in [false, true] {
             mislabelled(&host, epsg, swapped, None);
             let report = host.matches("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
-            let read_as = json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped });
-            assert_eq!(report["registration"]["read_as"], read_as);
+            assert_eq!(report["registration"]["read_as"], read_as(epsg, swapped));
             assert_eq!(report["registration"]["method"], "identity");
         }
     }
@@ -197,8 +202,7 @@ fn a_wrong_crs_is_seen_and_the_right_one_found() {
     ] {
         mislabelled(&host, epsg, swapped, Some(label));
         let report = host.matches("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
-        let read_as = json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped });
-        assert_eq!(report["registration"]["read_as"], read_as, "labelled EPSG:{label}");
+        assert_eq!(report["registration"]["read_as"], read_as(epsg, swapped), "labelled EPSG:{label}");
     }
 }
 
@@ -235,7 +239,8 @@ fn a_suspect_without_anything_or_elsewhere_is_inconclusive() {
                 "{}",
                 run.stderr
             );
-            assert!(report["reason"].as_str().unwrap().contains("not registered"), "{report}");
+            let reason = report["reason"].as_str().unwrap();
+            assert!(reason.contains("nothing to compare") || reason.contains("another map"), "{report}");
         }
     }
 }

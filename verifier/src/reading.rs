@@ -120,7 +120,7 @@ pub struct Suspect {
 pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
     let dataset = open_suspect(path)?;
     let layer_crs = crs_of(&dataset);
-    let crs = dataset.layers().find_map(|layer| layer.spatial_ref()).map(CoordinateSystem::new);
+    let crs = dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer);
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
         match survey_of(&dataset, reading, Target::Crs(target)) {
             Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
@@ -242,7 +242,7 @@ fn is_plain(sql: &str) -> bool {
 
 fn crs_of(dataset: &Dataset) -> Vec<String> {
     let label = |layer: gdal::vector::Layer| {
-        let crs = layer.spatial_ref().map(|crs| CoordinateSystem::new(crs).label());
+        let crs = layer.spatial_ref().and_then(CoordinateSystem::of_layer).map(|crs| crs.label());
         crs.unwrap_or_else(|| "no CRS".into())
     };
     dataset.layers().map(label).collect::<BTreeSet<_>>().into_iter().collect()
