@@ -39,7 +39,9 @@ pub fn register(
         _ => registrar.register(side(&map), start),
     };
     // Where the numbers were not reprojected they are taken to be in the reference's CRS.
-    let own = reference.crs.clone().filter(|_| is_raw).map(|crs| Assumption { crs, axes_swapped: false });
+    let has_numbers = is_raw && map.vertices.len() > 0;
+    let own =
+        reference.crs.clone().filter(|_| has_numbers).map(|crs| Assumption { crs, axes_swapped: false });
     let plain = Registered::new(map, own.as_ref(), at_first);
     if start == Start::None || plain.agrees() || !doubtful && plain.registration.agrees_in_part() {
         return Ok(plain);
