@@ -12,7 +12,7 @@ BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms quality conformance install uninstall fixtures deps lint
+.PHONY: build test demo bench table2 false-alarms faults quality conformance install uninstall fixtures deps lint
 
 build: deps
 	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
@@ -43,6 +43,11 @@ quality: build
 false-alarms: build
 	$(CARGO) build --release --locked -p meshmark-host-tests --bins
 	$(BUILD)/false_alarms --out target/false_alarms $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+
+# Kills and full disks while marked maps are written, more of them than in the tests.
+faults: build
+	$(CARGO) build --release --locked -p meshmark-host-tests --bin faults
+	$(BUILD)/faults
 
 conformance: build
 	host-tests/conformance/run.sh

@@ -7,8 +7,10 @@ meshmark=$1 map=$2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
+bold='' plain=''
+if [ -t 1 ]; then bold=$'\033[1m' plain=$'\033[0m'; fi
 run() {
-    printf '\n\033[1m$ %s\033[0m\n' "$*"
+    printf '\n%s$ %s%s\n' "$bold" "$*" "$plain"
     "$@"
 }
 

@@ -2,7 +2,7 @@
 
 use std::{env, process::Command};
 
-const SOURCES: [&str; 3] = ["cpp/driver.cpp", "cpp/dataset.cpp", "cpp/layer.cpp"];
+const SOURCES: [&str; 4] = ["cpp/driver.cpp", "cpp/dataset.cpp", "cpp/layer.cpp", "cpp/output.cpp"];
 const HEADERS: [&str; 2] = ["cpp/shim.h", "include/meshmark.h"];
 
 fn main() {

@@ -15,8 +15,11 @@ use crate::{
     spectrum::Basis,
 };
 use faer::{
-    Mat, Side,
-    linalg::solvers::{Llt, Solve},
+    Mat, Par, Side,
+    linalg::{
+        solvers::{Llt, Solve},
+        triangular_solve::solve_lower_triangular_in_place,
+    },
 };
 use rayon::prelude::*;
 
@@ -34,6 +37,10 @@ const SAMPLE_VERTICES: usize = 200;
 const LEAST_FOUND: usize = 30;
 /// A residual of more standard deviations than this weighs less (Huber 1964).
 const HUBER: f64 = 2.0;
+/// A residual of more standard deviations than this is no displacement of the vertex at all.
+const OUTLIER: f64 = 4.0;
+/// The law of the noise is read from residuals, which show it only when it is this many times the mark.
+const WEAK_MARK: f64 = 1.5;
 /// What a deformation must gain in log-likelihood to be believed.
 const WORTH_IT: f64 = 10.0;
 
@@ -64,6 +71,24 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// `observed` without the displacements that are no part of either deformation, mark or noise: vertices that
+    /// a cut or an edit made where no reference vertex went. The scale is the median of what the deformation
+    /// leaves, which a few of them do not move, and at least the mark's own.
+    pub fn without_outliers(&self, observed: &Observed, mark_m: f64) -> Vec<Option<[f64; 2]>> {
+        let rest =
+            |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [(o[0] - f[0]).abs(), (o[1] - f[1]).abs()]);
+        let rests: Vec<Option<[f64; 2]>> = observed.iter().zip(&self.displacement_m).map(rest).collect();
+        let mut sizes: Vec<f64> = rests.iter().flatten().flatten().copied().collect();
+        if sizes.is_empty() {
+            return observed.to_vec();
+        }
+        let middle = sizes.len() / 2;
+        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let most = OUTLIER * (median / 0.6745).max(mark_m); // the median of |N(0, 1)|
+        let fits = |r: &Option<[f64; 2]>| r.is_none_or(|r| r[0].max(r[1]) <= most);
+        observed.iter().zip(&rests).map(|(o, r)| o.filter(|_| fits(r))).collect()
+    }
+
     /// What to demodulate in place of `observed`: what the deformation leaves of every displacement goes
     /// through the [`NoiseLaw`] that fits, and the noise becomes as small as that makes it.
     pub fn shape_noise(
@@ -77,11 +102,11 @@ impl Prediction {
         let residuals: Vec<[f64; 2]> =
             observed.iter().zip(&self.displacement_m).filter_map(residual).collect();
         let law = NoiseLaw::of(residuals.as_flattened());
-        if law.exponent == 2.0 {
+        let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
+        if law.exponent == 2.0 || self.deformation.noise_m < WEAK_MARK * mark_m {
             return (observed.to_vec(), self);
         }
-        let share = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
-        let noise2 = law.variance_m2 - amplitude_m.powi(2) * share;
+        let noise2 = law.variance_m2 - mark_m.powi(2);
         self.deformation.noise_m = noise2.max(LEAST_NOISE_M.powi(2)).sqrt();
         let shaped = observed.iter().zip(&self.displacement_m).map(|(o, f)| {
             let axis = |o: &[f64; 2], a: usize| f[a] + law.apply(o[a] - f[a]);
@@ -89,6 +114,12 @@ impl Prediction {
         });
         (shaped.collect(), self)
     }
+}
+
+/// The standard deviation of the mark's displacement on one axis, metres: unit columns of E spread over n rows.
+pub fn mark_deviation_m(patches: &Patches, carriers: usize, amplitude_m: f64) -> f64 {
+    let per_vertex = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
+    amplitude_m * per_vertex.sqrt()
 }
 
 impl Deformation {
@@ -153,18 +184,73 @@ impl Deformation {
 
     /// σ_f² k(d / ℓ), Matérn 5/2.
     fn covariance(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
-        let d = 5f64.sqrt() * (a[0] - b[0]).hypot(a[1] - b[1]) / self.range_m;
+        let d = (5.0 * ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2))).sqrt() / self.range_m;
         self.deviation_m.powi(2) * (1.0 + d + d * d / 3.0) * (-d).exp()
     }
 
     /// Covariance of deformation, shift and noise over found vertices, o × o (its lower triangle: the
     /// factorisation reads no more); weights divide the noise.
-    pub(crate) fn matrix(&self, at: &[[f64; 2]], weights: &[f64]) -> Mat<f64> {
+    fn matrix(&self, at: &[[f64; 2]], weights: &[f64]) -> Mat<f64> {
         Mat::from_fn(at.len(), at.len(), |i, j| {
             let noise = if i == j { self.noise_m.powi(2) / weights[i] } else { 0.0 };
             let smooth = if self.deviation_m > 0.0 && i >= j { self.covariance(at[i], at[j]) } else { 0.0 };
             SHIFT_M.powi(2) + smooth + noise
         })
+    }
+}
+
+/// Covariance Σ of deformation, shift and noise over o found vertices, made ready to divide by.
+pub(crate) enum Covariance {
+    /// The Cholesky factor.
+    Dense(Llt<f64>),
+    /// Without a deformation Σ = P⁻¹ + s² 1 1ᵀ with a diagonal P, these precisions, and nothing needs factoring.
+    Shift(Vec<f64>),
+}
+
+impl Covariance {
+    pub fn new(deformation: &Deformation, at: &[[f64; 2]], weights: &[f64]) -> Self {
+        if deformation.deviation_m > 0.0 {
+            return Covariance::Dense(factor(&deformation.matrix(at, weights)));
+        }
+        Covariance::Shift(weights.iter().map(|w| w / deformation.noise_m.powi(2)).collect())
+    }
+
+    /// A square root of Σ⁻¹ times the columns of a matrix with o rows.
+    pub fn whiten(&self, mut columns: Mat<f64>) -> Mat<f64> {
+        match self {
+            Covariance::Dense(factor) => {
+                solve_lower_triangular_in_place(factor.L(), columns.as_mut(), Par::Seq);
+            }
+            Covariance::Shift(precisions) => {
+                // With q = P^½ 1: Σ⁻¹ = P^½ (1 + s² q qᵀ)⁻¹ P^½, and (1 + s² q qᵀ)^−½ = 1 − β q qᵀ.
+                let total: f64 = precisions.iter().sum();
+                let beta = (1.0 - 1.0 / (1.0 + SHIFT_M.powi(2) * total).sqrt()) / total;
+                let roots: Vec<f64> = precisions.iter().map(|p| p.sqrt()).collect();
+                for j in 0..columns.ncols() {
+                    let column = columns.col_as_slice_mut(j);
+                    let mean: f64 = column.iter().zip(precisions).map(|(x, p)| x * p).sum::<f64>() * beta;
+                    column.iter_mut().zip(&roots).for_each(|(x, q)| *x = q * (*x - mean));
+                }
+            }
+        }
+        columns
+    }
+
+    /// Σ⁻¹ times the columns of a matrix with o rows.
+    fn solve(&self, columns: &Mat<f64>) -> Mat<f64> {
+        match self {
+            Covariance::Dense(factor) => factor.solve(columns),
+            Covariance::Shift(precisions) => {
+                let total: f64 = precisions.iter().sum();
+                let share = SHIFT_M.powi(2) / (1.0 + SHIFT_M.powi(2) * total);
+                let mean =
+                    |j| share * (0..columns.nrows()).map(|i| columns[(i, j)] * precisions[i]).sum::<f64>();
+                let means: Vec<f64> = (0..columns.ncols()).map(mean).collect();
+                Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| {
+                    precisions[i] * (columns[(i, j)] - means[j])
+                })
+            }
+        }
     }
 }
 
@@ -202,6 +288,8 @@ struct Kriging {
     weights: Vec<f64>,
     /// Σ⁻¹ y, o × 2.
     solved: Mat<f64>,
+    /// y − f̂ at the found vertices, metres.
+    residuals_m: Vec<[f64; 2]>,
 }
 
 struct PatchPrediction {
@@ -215,31 +303,41 @@ impl Kriging {
     fn new(deformation: Deformation, found: Found) -> Self {
         let mut weights = vec![1.0; found.rows.len()];
         let mut solved = Mat::zeros(found.rows.len(), 2);
+        let mut residuals_m = Vec::new();
         for _ in 0..if found.rows.is_empty() { 0 } else { 3 } {
-            solved = factor(&deformation.matrix(&found.at, &weights)).solve(&found.moved);
-            for (o, weight) in weights.iter_mut().enumerate() {
-                // The residual is y − f̂ = (σ² / w) Σ⁻¹ y.
-                let residual_m = solved[(o, 0)].hypot(solved[(o, 1)]) * deformation.noise_m.powi(2) / *weight;
-                *weight = (HUBER * deformation.noise_m / residual_m).min(1.0);
+            solved = Covariance::new(&deformation, &found.at, &weights).solve(&found.moved);
+            // The residual is y − f̂ = (σ² / w) Σ⁻¹ y.
+            let residual_m = |(o, w): (usize, &f64)| {
+                [0, 1].map(|axis| solved[(o, axis)] * deformation.noise_m.powi(2) / w)
+            };
+            residuals_m = weights.iter().enumerate().map(residual_m).collect();
+            for (weight, [x, y]) in weights.iter_mut().zip(&residuals_m) {
+                *weight = (HUBER * deformation.noise_m / x.hypot(*y)).min(1.0);
             }
         }
-        Kriging { deformation, found, weights, solved }
+        Kriging { deformation, found, weights, solved, residuals_m }
     }
 
     fn predict(self, patches: &Patches, patch: &Patch) -> PatchPrediction {
         let total = |axis: usize| (0..self.found.rows.len()).map(|o| self.solved[(o, axis)]).sum::<f64>();
         let shift = [0, 1].map(|axis| SHIFT_M.powi(2) * total(axis));
-        let at_vertex = |&v: &u32| {
-            if self.deformation.deviation_m == 0.0 {
-                return shift;
-            }
+        let anywhere = |v: u32| {
             let here = patches.positions_m()[v as usize];
             self.found.at.iter().enumerate().fold(shift, |sum, (o, &there)| {
                 let k = self.deformation.covariance(here, there);
                 [sum[0] + k * self.solved[(o, 0)], sum[1] + k * self.solved[(o, 1)]]
             })
         };
-        let displacement_m = patch.vertices.iter().map(at_vertex).collect();
+        let mut displacement_m = vec![None; patch.vertices.len()];
+        if self.deformation.deviation_m == 0.0 {
+            displacement_m.fill(Some(shift));
+        }
+        for (o, &row) in self.found.rows.iter().enumerate() {
+            let fitted = [0, 1].map(|axis| self.found.moved[(o, axis)] - self.residuals_m[o][axis]);
+            displacement_m[row].get_or_insert(fitted);
+        }
+        let each = displacement_m.into_iter().zip(&patch.vertices);
+        let displacement_m = each.map(|(known, &v)| known.unwrap_or_else(|| anywhere(v))).collect();
         PatchPrediction { displacement_m, rows: self.found.rows, weights: self.weights }
     }
 }
@@ -347,6 +445,48 @@ mod tests {
         let mut misses: Vec<f64> = (0..600).step_by(3).map(miss).collect();
         misses.sort_by(f64::total_cmp);
         assert!(misses[100] < 0.03 && misses[190] < 0.2, "{} {}", misses[100], misses[190]);
+    }
+
+    #[test]
+    fn without_a_deformation_the_covariance_needs_no_factoring_and_at_a_found_vertex_no_kernel() {
+        let patches = patches();
+        let found = Found::new(&patches, &patches.as_slice()[0], &observed(&patches));
+        let weights: Vec<f64> = (0..found.rows.len()).map(|o| 0.1 + (o % 10) as f64 / 10.0).collect();
+        let still = Deformation::none(0.03);
+        let (quick, dense) = (
+            Covariance::new(&still, &found.at, &weights),
+            Covariance::Dense(factor(&still.matrix(&found.at, &weights))),
+        );
+        let difference = quick.solve(&found.moved) - dense.solve(&found.moved);
+        assert!(difference.norm_max() < 1e-8 * dense.solve(&found.moved).norm_max());
+        let gram = |covariance: &Covariance| {
+            let white = covariance.whiten(found.moved.clone());
+            white.transpose() * &white
+        };
+        assert!((gram(&quick) - gram(&dense)).norm_max() < 1e-9 * gram(&dense).norm_max());
+        // A smooth deformation without noise to speak of goes through what was observed.
+        let smooth = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 1e-4 };
+        let observed: Vec<_> = patches.positions_m().iter().map(|p| Some(wave(*p))).collect();
+        let prediction = smooth.predict(&patches, &observed, 64, 0.0);
+        for (predicted, observed) in prediction.displacement_m.iter().zip(observed.iter().flatten()) {
+            assert!((predicted[0] - observed[0]).hypot(predicted[1] - observed[1]) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_few_wrong_matches_are_dropped_and_honest_displacements_stay() {
+        let patches = patches();
+        let mut observed = observed(&patches);
+        for wrong in [100, 301, 400] {
+            observed[wrong] = observed[wrong].map(|[x, y]| [x + 0.7, y - 0.7]);
+        }
+        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 0.02 };
+        let prediction = deformation.predict(&patches, &observed, 64, 0.001);
+        let kept = prediction.without_outliers(&observed, 0.01);
+        assert!([100, 301, 400].iter().all(|&wrong| kept[wrong].is_none()));
+        let (before, after) = (observed.iter().flatten().count(), kept.iter().flatten().count());
+        assert!(before - after <= 3 + before / 50, "{before} {after}");
+        assert_eq!(prediction.without_outliers(&[None; 600], 0.01), [None; 600]);
     }
 
     #[test]

@@ -8,17 +8,14 @@ use crate::{
     Result,
     carrier::{Carrier, bit_of_coefficient},
     code::{Code, Decoded},
-    deformation::{Found, Observed, Prediction, factor},
+    deformation::{Covariance, Found, Observed, Prediction, factor},
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
     response::{Kernel, Response},
     spectrum::Basis,
 };
-use faer::{
-    Mat, Par,
-    linalg::{solvers::Solve, triangular_solve::solve_lower_triangular_in_place},
-};
+use faer::{Mat, linalg::solvers::Solve};
 use rand_chacha::{
     ChaCha20Rng,
     rand_core::{Rng, SeedableRng},
@@ -216,16 +213,13 @@ pub fn joint(
         }
         let weights: Vec<f64> =
             found.rows.iter().map(|&row| disturbance.weights[patch.vertices[row] as usize]).collect();
-        let factor = factor(&disturbance.deformation.matrix(&found.at, &weights));
-        let whiten = |mut matrix: Mat<f64>| {
-            solve_lower_triangular_in_place(factor.L(), matrix.as_mut(), Par::Seq);
-            matrix
-        };
-        let seen = Response::carriers(patch, basis, parameters.shape).rows(&found.rows).map(whiten);
-        let moved = whiten(found.moved.clone());
-        let kernels = seen.kernels();
-        let trace = kernels.iter().map(Kernel::trace).sum();
-        Sums::new(&job, job.fold(&kernels, chips), seen.correlations(&moved), chips, trace)
+        let covariance = Covariance::new(&disturbance.deformation, &found.at, &weights);
+        let seen = Response::carriers(patch, basis, parameters.shape).rows(&found.rows);
+        let seen = seen.map(|block| covariance.whiten(block));
+        let kernel = seen.kernel();
+        let correlations = seen.correlations(&covariance.whiten(found.moved.clone()));
+        let trace = kernel.trace();
+        Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
     })?;
     let amplitude_m = parameters.amplitude_m;
     let gram = Mat::from_fn(job.bits, job.bits, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
@@ -242,7 +236,7 @@ pub fn joint(
     })
 }
 
-/// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹.
+/// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹, of the lower triangle of G.
 fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let m = gram.nrows();
     (0..m).for_each(|j| gram[(j, j)] += 1.0);
@@ -264,7 +258,7 @@ struct Job<'a> {
 
 /// What the patches add up to.
 struct Sums {
-    /// m × m for [`joint`], m × 1 for [`paper`], of m channel bits.
+    /// The lower triangle of m × m for [`joint`], m × 1 for [`paper`], of m channel bits.
     gram: Mat<f64>,
     scores: Vec<f64>,
     correlations: Vec<f64>,
@@ -326,14 +320,25 @@ impl<'a> Job<'a> {
         bit_of_coefficient(i + 1, self.parameters.chip_rate)
     }
 
-    /// Cᵀ diag(p) K diag(p) C, m × m, of both axes: K are the blocks of the kernel, m·c × m·c each.
-    fn fold(&self, kernels: &[Kernel], chips: &[Vec<f64>; 2]) -> Mat<f64> {
+    /// The lower triangle of Cᵀ diag(p) K diag(p) C, m × m, from the kernel K of both axes, 2·m·c × 2·m·c.
+    fn fold(&self, kernel: &Kernel, chips: &[Vec<f64>; 2]) -> Mat<f64> {
         let mut gram = Mat::zeros(self.bits, self.bits);
-        for Kernel { axes, block } in kernels {
+        // Two chips of one bit meet on the diagonal, once from either side of K's.
+        let times = |i: usize, k: usize| if self.bit(i) == self.bit(k) { 2.0 } else { 1.0 };
+        for (axes, lower) in &kernel.own {
             for k in 0..self.carriers {
-                for i in 0..self.carriers {
-                    let sign: f64 = axes.iter().map(|[a, b]| chips[*a][i] * chips[*b][k]).sum();
-                    gram[(self.bit(i), self.bit(k))] += sign * block[(i, k)];
+                for (i, value) in (k..self.carriers).zip(&lower.col_as_slice(k)[k..]) {
+                    let sign: f64 = axes.iter().map(|&axis| chips[axis][i] * chips[axis][k]).sum();
+                    let times = if i == k { 1.0 } else { times(i, k) };
+                    gram[(self.bit(i), self.bit(k))] += times * sign * value;
+                }
+            }
+        }
+        if let Some(cross) = &kernel.cross {
+            for k in 0..self.carriers {
+                for (i, value) in cross.col_as_slice(k).iter().enumerate() {
+                    let (row, column) = (self.bit(i.max(k)), self.bit(i.min(k)));
+                    gram[(row, column)] += times(i, k) * chips[0][i] * chips[1][k] * value;
                 }
             }
         }

@@ -27,6 +27,7 @@ pub enum Error {
     EmptyName { option: &'static str, value: String },
     IllegalValue { option: &'static str, value: String, kind: Kind },
     BothSubjects,
+    NoReference,
 }
 
 /// The result of every fallible function of this crate.
@@ -111,6 +112,10 @@ impl Error {
             Error::IllegalValue { option, value, kind } => {
                 format!("{} is not {}", spelling.value(option, value), kind.legal())
             }
+            Error::NoReference => format!(
+                "there is no {}: name a GeoPackage for the unmarked map, which nobody else will have",
+                name("REFERENCE")
+            ),
             Error::BothSubjects => {
                 format!("both {} and {} are given: give exactly one", name("RECIPIENT"), name("MESSAGE"))
             }

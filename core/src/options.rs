@@ -182,6 +182,25 @@ pub const OPTIONS: &[OptionSpec] = &[
     ),
 ];
 
+/// What the driver needs besides when it writes, in the order of the docs.
+pub const CREATION_OPTIONS: &[OptionSpec] = &[
+    row(
+        "REFERENCE",
+        Kind::Text,
+        None,
+        false,
+        "GeoPackage to write with the unmarked map as it arrived, which verification needs; required",
+    ),
+    row(
+        "FORMAT",
+        Kind::Text,
+        None,
+        false,
+        "Short name of the GDAL driver that writes the marked map; by default the one of the file name extension",
+    ),
+    row("OVERWRITE", Kind::Choice(&["NO", "YES"]), Some("NO"), false, "Replace the file when it exists"),
+];
+
 /// Looks a row up by its name, in any case.
 pub fn spec(name: &str) -> Option<&'static OptionSpec> {
     OPTIONS.iter().find(|o| o.name.eq_ignore_ascii_case(name))
@@ -305,7 +324,7 @@ impl Options {
     /// An unknown name, a name given twice, a value that is not what its row says, both RECIPIENT and
     /// MESSAGE, bad hexadecimal digits.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
-        let values = Values::collect(pairs)?;
+        let values = Values::collect(OPTIONS, pairs)?;
         let precision = values.number("PRECISION")?;
         let subject = values.subject()?;
         let code = values.choice("CODE", Code::from_name)?;
@@ -336,10 +355,13 @@ impl Options {
 struct Values<'a>(Vec<(&'static OptionSpec, &'a str)>);
 
 impl<'a> Values<'a> {
-    fn collect(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
+    fn collect(
+        options: &'static [OptionSpec],
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self> {
         let mut values: Vec<(&OptionSpec, &str)> = Vec::new();
         for (name, value) in pairs {
-            let Some(spec) = spec(name) else {
+            let Some(spec) = options.iter().find(|o| o.name.eq_ignore_ascii_case(name)) else {
                 return Err(Error::UnknownOption(name.into()));
             };
             if values.iter().any(|(s, _)| s.name == spec.name) {
@@ -406,10 +428,56 @@ impl<'a> Values<'a> {
     }
 }
 
-/// The XML option list a GDAL driver declares (DMD_OPENOPTIONLIST).
-pub fn option_list_xml() -> String {
-    let rows: String = OPTIONS.iter().map(option_xml).collect();
-    format!("<OpenOptionList>{rows}</OpenOptionList>")
+/// Where and how the marked map is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Creation {
+    /// Path of the unmarked map to write.
+    pub reference_path: String,
+    /// GDAL's short name of the format, when it is not to follow from the file name.
+    pub format: Option<String>,
+    /// Whether a file that exists is replaced.
+    pub overwrite: bool,
+}
+
+impl Creation {
+    /// Parses the rows of [`CREATION_OPTIONS`].
+    ///
+    /// # Errors
+    /// A name that is none of them or given twice, an illegal value, no REFERENCE.
+    pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
+        let values = Values::collect(CREATION_OPTIONS, pairs)?;
+        let reference_path = values.text("REFERENCE")?.ok_or(Error::NoReference)?;
+        let overwrite = match values.given("OVERWRITE") {
+            None => false,
+            Some(word) if word.eq_ignore_ascii_case("YES") => true,
+            Some(word) if word.eq_ignore_ascii_case("NO") => false,
+            Some(word) => {
+                let kind = Kind::Choice(&["NO", "YES"]);
+                return Err(Error::IllegalValue { option: "OVERWRITE", value: word.into(), kind });
+            }
+        };
+        Ok(Creation { reference_path, format: values.text("FORMAT")?, overwrite })
+    }
+
+    /// Whether an option is one of [`CREATION_OPTIONS`].
+    pub fn has(name: &str) -> bool {
+        CREATION_OPTIONS.iter().any(|o| o.name.eq_ignore_ascii_case(name))
+    }
+}
+
+/// The XML list of open options a GDAL driver declares (DMD_OPENOPTIONLIST).
+pub fn open_option_list_xml() -> String {
+    list_xml("OpenOptionList", OPTIONS.iter())
+}
+
+/// The XML list of dataset creation options a GDAL driver declares (DMD_CREATIONOPTIONLIST).
+pub fn creation_option_list_xml() -> String {
+    list_xml("CreationOptionList", OPTIONS.iter().chain(CREATION_OPTIONS))
+}
+
+fn list_xml<'a>(element: &str, options: impl Iterator<Item = &'a OptionSpec>) -> String {
+    let rows: String = options.map(option_xml).collect();
+    format!("<{element}>{rows}</{element}>")
 }
 
 fn option_xml(option: &OptionSpec) -> String {
@@ -428,12 +496,12 @@ fn option_xml(option: &OptionSpec) -> String {
     format!("<Option name='{}' {attributes}>{values}</Option>", option.name)
 }
 
-/// The options as a Markdown table, for the docs.
-pub fn option_table_markdown() -> String {
+/// Options as a Markdown table, for the docs.
+pub fn option_table_markdown(options: &[OptionSpec]) -> String {
     let row = |o: &OptionSpec| {
         format!("| `{}` | {} | {} |\n", o.name, o.default.map_or("".into(), |d| format!("`{d}`")), o.help)
     };
-    let rows: String = OPTIONS.iter().map(row).collect();
+    let rows: String = options.iter().map(row).collect();
     format!("| option | default | meaning |\n|---|---|---|\n{rows}")
 }
 
@@ -494,10 +562,23 @@ mod tests {
     }
 
     #[test]
-    fn the_xml_list_declares_every_option() {
-        let xml = option_list_xml();
-        for option in OPTIONS {
-            assert!(xml.contains(&format!("name='{}'", option.name)));
+    fn creation_needs_a_reference_and_knows_yes_from_no() {
+        let creation = |pairs: &[(&'static str, &'static str)]| Creation::parse(pairs.iter().copied());
+        let parsed = creation(&[("reference", "ref.gpkg"), ("OVERWRITE", "yes"), ("FORMAT", "GML")]).unwrap();
+        assert_eq!((parsed.reference_path.as_str(), parsed.overwrite), ("ref.gpkg", true));
+        assert_eq!(parsed.format.as_deref(), Some("GML"));
+        assert!(!creation(&[("REFERENCE", "r")]).unwrap().overwrite);
+        let error = |pairs| creation(pairs).unwrap_err().to_string();
+        assert!(error(&[]).contains("there is no REFERENCE"));
+        assert!(error(&[("REFERENCE", "r"), ("OVERWRITE", "maybe")]).contains("OVERWRITE=maybe is not"));
+    }
+
+    #[test]
+    fn the_xml_lists_declare_every_option() {
+        let (open, create) = (open_option_list_xml(), creation_option_list_xml());
+        for option in OPTIONS.iter().chain(CREATION_OPTIONS) {
+            let name = format!("name='{}'", option.name);
+            assert_eq!((open.contains(&name), create.contains(&name)), (!Creation::has(option.name), true));
             assert!(!option.help.contains(['\'', '<', '&']), "{} would break the XML", option.name);
         }
     }

@@ -1,7 +1,10 @@
 //! How the vertices of a patch respond to its coefficients, constraints included.
 
 use crate::{options::Shape, patches::Patch, spectrum::Basis};
-use faer::{Mat, Scale};
+use faer::{
+    Accum, Mat, Par, Scale,
+    linalg::matmul::triangular::{self, BlockStructure},
+};
 
 /// What unit coefficients move, per axis n × k.
 pub(crate) enum Response {
@@ -11,17 +14,21 @@ pub(crate) enum Response {
     Coupled([[Mat<f64>; 2]; 2]),
 }
 
-/// A block of the products of columns: rows are coefficients of the first axis of each pair, columns of the second.
+/// The products of all columns with all columns.
 pub(crate) struct Kernel {
-    pub axes: Vec<[usize; 2]>,
-    pub block: Mat<f64>,
+    /// Of columns of one axis with each other, for the axes named: lower triangles, k × k.
+    pub own: Vec<(Vec<usize>, Mat<f64>)>,
+    /// Of columns of the first axis (rows) with those of the second (columns), where they are not 0.
+    pub cross: Option<Mat<f64>>,
 }
 
 impl Kernel {
-    /// Of the whole matrix of products, what this block adds to the sum of the diagonal.
+    /// The sum of the diagonal.
     pub fn trace(&self) -> f64 {
-        let sum: f64 = (0..self.block.ncols()).map(|i| self.block[(i, i)]).sum();
-        sum * self.axes.iter().filter(|[a, b]| a == b).count() as f64
+        let of = |(axes, lower): &(Vec<usize>, Mat<f64>)| {
+            axes.len() as f64 * (0..lower.ncols()).map(|i| lower[(i, i)]).sum::<f64>()
+        };
+        self.own.iter().map(of).sum()
     }
 }
 
@@ -85,21 +92,16 @@ impl Response {
     }
 
     /// Products of all columns with all columns.
-    pub fn kernels(&self) -> Vec<Kernel> {
+    pub fn kernel(&self) -> Kernel {
         match self {
-            Response::Separate(block) => {
-                vec![Kernel { axes: vec![[0, 0], [1, 1]], block: block.transpose() * block }]
-            }
-            Response::Coupled([[xx, xy], [yx, yy]]) => {
-                let cross = xx.transpose() * xy + yx.transpose() * yy;
-                let transposed = cross.transpose().to_owned();
-                vec![
-                    Kernel { axes: vec![[0, 0]], block: xx.transpose() * xx + yx.transpose() * yx },
-                    Kernel { axes: vec![[1, 1]], block: xy.transpose() * xy + yy.transpose() * yy },
-                    Kernel { axes: vec![[0, 1]], block: cross },
-                    Kernel { axes: vec![[1, 0]], block: transposed },
-                ]
-            }
+            Response::Separate(block) => Kernel { own: vec![(vec![0, 1], lower_gram(block))], cross: None },
+            Response::Coupled([[xx, xy], [yx, yy]]) => Kernel {
+                own: vec![
+                    (vec![0], lower_gram(xx) + lower_gram(yx)),
+                    (vec![1], lower_gram(xy) + lower_gram(yy)),
+                ],
+                cross: Some(xx.transpose() * xy + yx.transpose() * yy),
+            },
         }
     }
 
@@ -132,6 +134,23 @@ impl Response {
             }
         }
     }
+}
+
+/// The lower triangle of XᵀX, zeros above it.
+fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
+    let mut gram = Mat::zeros(x.ncols(), x.ncols());
+    triangular::matmul(
+        gram.as_mut(),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        x.transpose(),
+        BlockStructure::Rectangular,
+        x,
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    gram
 }
 
 /// Bodies take the mean of their vertices as a shift, and turn by θ = Σ (r_x u_y − r_y u_x) / Σ |r|²: the rigid

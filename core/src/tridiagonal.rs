@@ -10,6 +10,7 @@
 //! enclosures are disjoint, and the error of a vector is at most its residual over the distance to the next
 //! eigenvalue. A matrix that does not pass, one with repeated eigenvalues for example, is solved by divide
 //! and conquer.
+#![expect(clippy::needless_range_loop)] // one lane of several arrays at a time
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{self, SelfAdjointEvdParams};

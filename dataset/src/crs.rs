@@ -15,6 +15,12 @@ impl CoordinateSystem {
         CoordinateSystem(srs)
     }
 
+    /// The CRS of a layer; `None` where it says "undefined", as GeoPackages do that were written without one.
+    pub fn of_layer(srs: SpatialRef) -> Option<Self> {
+        let is_undefined = srs.name().is_some_and(|name| name.starts_with("Undefined "));
+        (!is_undefined).then(|| Self::new(srs))
+    }
+
     /// "EPSG:3067", or WKT when it has no code.
     pub fn label(&self) -> String {
         self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
@@ -28,6 +34,27 @@ impl CoordinateSystem {
     /// The transformation of coordinates from this CRS into `target`.
     pub(crate) fn transform_to(&self, target: &CoordinateSystem) -> gdal::errors::Result<CoordTransform> {
         CoordTransform::new(&self.0, &target.0)
+    }
+
+    /// Places in degrees east of Greenwich and north, on this CRS's own datum; `None` where it has no such place.
+    pub(crate) fn degrees(&self, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+        let (mut x, mut y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
+        let Ok(geographic) = self.0.geog_cs().map(CoordinateSystem::new) else {
+            return vec![None; points.len()];
+        };
+        if !self.0.is_geographic() {
+            let Ok(transform) = self.transform_to(&geographic) else { return vec![None; points.len()] };
+            // An error is of some points only; those are not finite then.
+            let _ = transform.transform_coords(&mut x, &mut y, &mut []);
+        }
+        let prime_meridian = geographic.0.get_attr_value("PRIMEM", 1).ok().flatten();
+        let prime_meridian: f64 = prime_meridian.and_then(|text| text.parse().ok()).unwrap_or(0.0);
+        let unit = geographic.0.angular_units().to_degrees();
+        let place = |(x, y): (f64, f64)| {
+            let place = [x * unit + prime_meridian, y * unit];
+            (place[0].is_finite() && place[1].abs() <= 90.0).then_some(place)
+        };
+        x.into_iter().zip(y).map(place).collect()
     }
 
     fn ground(&self, table: &VertexTable) -> Result<Ground> {

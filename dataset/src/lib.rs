@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod assumption;
 mod crs;
 mod error;
 mod features;
@@ -11,6 +12,7 @@ mod shapes;
 mod survey;
 pub mod wkb;
 
+pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
 pub use features::{FeatureGeometry, features};

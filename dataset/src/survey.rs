@@ -80,6 +80,39 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// The same map with all its coordinates taken into another CRS by `bring`.
+    ///
+    /// # Errors
+    /// Those of `bring`, and a CRS in which metres mean nothing.
+    pub(crate) fn brought(
+        &self,
+        crs: &CoordinateSystem,
+        bring: impl Fn(Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>>,
+    ) -> Result<Survey> {
+        let (vertices, indices) = VertexTable::indexed(bring(self.vertices.coords().to_vec())?)?;
+        let moved = |segment: &[u32; 2]| segment.map(|v| indices[v as usize]);
+        let mut segments: Vec<[u32; 2]> = self
+            .segments
+            .iter()
+            .map(moved)
+            .filter(|[a, b]| a != b)
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        segments.sort_unstable();
+        segments.dedup();
+        let mut joined = Joined::none(vertices.len());
+        indices.iter().zip(&self.polygons).for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
+        let polygons = joined.firsts();
+        let places = bring(self.labels.iter().map(|label| label.point).collect())?;
+        let in_shapes = bring(self.shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect())?;
+        let (mut labels, mut shapes) = (self.labels.clone(), self.shapes.clone());
+        labels.iter_mut().zip(places).for_each(|(label, place)| label.point = place);
+        let of_shapes = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
+        of_shapes.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
+        let ground = Some(crs::ground(Some(crs), &vertices)?);
+        Ok(Survey { vertices, segments, polygons, crs: Some(crs.clone()), ground, labels, shapes })
+    }
+
     /// Metres on the ground.
     ///
     /// # Errors
@@ -183,14 +216,7 @@ fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
 
 /// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
 fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) -> Vec<u32> {
-    let mut first: Vec<u32> = (0..vertices as u32).collect();
-    fn root(first: &mut [u32], mut v: u32) -> u32 {
-        while first[v as usize] != v {
-            first[v as usize] = first[first[v as usize] as usize];
-            v = first[v as usize];
-        }
-        v
-    }
+    let mut joined = Joined::none(vertices);
     let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
     let mut shell = 0;
     for ((&start, end), kind) in starts.iter().zip(ends).zip(kinds) {
@@ -199,15 +225,35 @@ fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) ->
             Step::Hole => {}
             Step::First | Step::Next => continue,
         }
-        for &v in &indices[start as usize..end] {
-            let (a, b) = (root(&mut first, v), root(&mut first, shell));
-            first[a.max(b) as usize] = a.min(b);
+        indices[start as usize..end].iter().for_each(|&v| joined.join(v, shell));
+    }
+    joined.firsts()
+}
+
+/// Sets of vertices, each known by its first one (union-find).
+struct Joined(Vec<u32>);
+
+impl Joined {
+    fn none(vertices: usize) -> Self {
+        Joined((0..vertices as u32).collect())
+    }
+
+    fn root(&mut self, mut v: u32) -> u32 {
+        while self.0[v as usize] != v {
+            self.0[v as usize] = self.0[self.0[v as usize] as usize];
+            v = self.0[v as usize];
         }
+        v
     }
-    for v in 0..vertices as u32 {
-        first[v as usize] = root(&mut first, v);
+
+    fn join(&mut self, v: u32, w: u32) {
+        let (a, b) = (self.root(v), self.root(w));
+        self.0[a.max(b) as usize] = a.min(b);
     }
-    first
+
+    fn firsts(mut self) -> Vec<u32> {
+        (0..self.0.len() as u32).map(|v| self.root(v)).collect()
+    }
 }
 
 struct Walk<'a> {
@@ -284,7 +330,7 @@ impl Walk<'_> {
             (None, given) => Ok(given.clone()),
         };
         let fields = layer.defn().geom_fields();
-        fields.map(|field| crs(field.spatial_ref().ok().map(CoordinateSystem::new))).collect()
+        fields.map(|field| crs(field.spatial_ref().ok().and_then(CoordinateSystem::of_layer))).collect()
     }
 
     /// Layers that share one mesh share one CRS.
@@ -345,7 +391,7 @@ impl From<wkb::WkbError> for Visit {
 }
 
 /// Brings coordinates into `target`; those of a layer without a CRS are taken to be in it.
-fn reproject(
+pub(crate) fn reproject(
     coords: &mut [[f64; 2]],
     from: Option<&CoordinateSystem>,
     target: &CoordinateSystem,

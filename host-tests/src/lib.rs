@@ -3,6 +3,7 @@ pub mod cgal;
 pub mod contents;
 pub mod delaunay_check;
 pub mod false_alarms;
+pub mod faults;
 pub mod plot;
 pub mod plugin;
 pub mod table2;

@@ -18,7 +18,8 @@ const SOURCES: [&str; 4] = ["core/src", "dataset/src", "plugin/src", "plugin/cpp
 /// When it is not there, or older than its sources: a test must not pass on yesterday's plugin.
 pub fn library() -> PathBuf {
     let program = std::env::current_exe().expect("a program has a path");
-    let folder = program.parent().and_then(Path::parent).expect("cargo puts tests in deps/");
+    let folder = program.parent().expect("a program is in a folder");
+    let folder = if folder.ends_with("deps") { folder.with_file_name("") } else { folder.into() }; // a test
     let library = folder.join("libmeshmark_plugin.so");
     let remedy = "run `make build` first";
     let built = modified(&library).unwrap_or_else(|| panic!("{} is missing: {remedy}", library.display()));
@@ -78,6 +79,21 @@ impl Host {
         "c5".repeat(32)
     }
 
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        self.work.path()
+    }
+
+    /// Where GDAL's programs find the plugin.
+    pub fn plugins(&self) -> &Path {
+        self.plugins.path()
+    }
+
+    /// The names of what is in the folder, sorted.
+    pub fn names(&self) -> Vec<String> {
+        self.files().into_iter().map(|(name, _)| name).collect()
+    }
+
     /// A file of the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.work.path().join(name)
@@ -119,6 +135,46 @@ impl Host {
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
             stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
         }
+    }
+
+    /// The command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a recipient, the reference
+    /// `ref.gpkg`, the record `record.json` and more options.
+    pub fn create_arguments(target: &str, source: &str, more: &[&str]) -> Vec<String> {
+        let options = ["KEY=key.json", "RECIPIENT=ACME GmbH", "REFERENCE=ref.gpkg", "RECORD=record.json"];
+        let named = |name: &str| {
+            more.iter().any(|o| o.starts_with(name) || name == "RECIPIENT=" && o.starts_with("MESSAGE="))
+        };
+        let missing = options.iter().filter(|o| !named(&o[..=o.find('=').unwrap()]));
+        let fixed = ["-f".into(), "MESHMARK".into(), format!("MESHMARK:{target}"), source.into()];
+        let options = missing.flat_map(|option| ["-dsco".to_string(), option.to_string()]);
+        fixed.into_iter().chain(options).chain(more.iter().map(|o| o.to_string())).collect()
+    }
+
+    /// Runs that.
+    pub fn create(&self, target: &str, source: &str, more: &[&str]) -> Run {
+        let arguments = Self::create_arguments(target, source, more);
+        self.run("ogr2ogr", &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    /// `meshmark verify --json` with the host's key; `more` holds flags and, last, the suspect.
+    pub fn verify(&self, reference: &str, more: &[&str]) -> (Run, serde_json::Value) {
+        let command = library().with_file_name("meshmark");
+        let mut arguments = vec!["verify", "--json", "--key", "key.json", "--reference", reference];
+        arguments.extend(more);
+        let run = self.run(command.to_str().unwrap(), &arguments);
+        let report = serde_json::from_str(&run.stdout).unwrap_or(serde_json::Value::Null);
+        (run, report)
+    }
+
+    /// The report of a suspect that must match without a wrong bit.
+    #[track_caller]
+    pub fn matches(&self, reference: &str, more: &[&str]) -> serde_json::Value {
+        let (run, report) = self.verify(reference, more);
+        assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+        assert_eq!(report["verdict"], "match");
+        assert_eq!(report["bit_errors"], 0);
+        assert!(report["p_value_log10"].as_f64().unwrap() < -12.0);
+        report
     }
 
     /// `ogr2ogr -f FORMAT output MESHMARK:source` with the key, a recipient and more options.

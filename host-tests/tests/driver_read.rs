@@ -465,10 +465,15 @@ fn output_options_of_the_real_driver_work() {
 fn gdal_lists_the_driver_and_its_options() {
     let host = Host::new();
     let formats = host.run("ogrinfo", &["--formats"]).succeeds().stdout;
-    assert!(formats.contains("MESHMARK -vector- (rov):"), "read only, also from virtual files");
+    assert!(formats.contains("MESHMARK -vector- (rw+v):"), "reads, also from virtual files, and creates");
     let details = host.run("ogrinfo", &["--format", "MESHMARK"]).succeeds().stdout;
+    let (create, open) = details.split_once("<OpenOptionList>").unwrap();
     for option in meshmark_core::options::OPTIONS {
-        assert!(details.contains(&format!("name=\"{}\"", option.name)), "{}", option.name);
+        assert!(open.contains(&format!("name=\"{}\"", option.name)), "{}", option.name);
+        assert!(create.contains(&format!("name=\"{}\"", option.name)), "{}", option.name);
+    }
+    for option in meshmark_core::options::CREATION_OPTIONS {
+        assert!(create.contains(&format!("name=\"{}\"", option.name)), "{}", option.name);
     }
     assert!(details.contains("Connection prefix: MESHMARK:"));
     let identified = host.run("ogrinfo", &["-so", &source("helsinki.gpkg")]).succeeds().stdout;

@@ -1,30 +1,12 @@
 //! Mark with `ogr2ogr`, do to the file what people do, verify with `meshmark verify`.
 
+use gdal::spatial_ref::SpatialRef;
+use geo::CoordsIter;
 use meshmark_host_tests::{
-    attacks::{Map, deformation, features, similarity},
-    plugin::{Host, Run, library},
+    attacks::{Map, deformation, features, reproject, similarity},
+    plugin::{Host, library},
 };
-use serde_json::Value;
-
-/// `meshmark verify --json` with the host's key; `more` holds flags and, last, the suspect.
-fn verify(host: &Host, reference: &str, more: &[&str]) -> (Run, Value) {
-    let command = library().with_file_name("meshmark");
-    let mut arguments = vec!["verify", "--json", "--key", "key.json", "--reference", reference];
-    arguments.extend(more);
-    let run = host.run(command.to_str().unwrap(), &arguments);
-    let report = serde_json::from_str(&run.stdout).unwrap_or(Value::Null);
-    (run, report)
-}
-
-#[track_caller]
-fn matches(host: &Host, reference: &str, more: &[&str]) -> Value {
-    let (run, report) = verify(host, reference, more);
-    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
-    assert_eq!(report["verdict"], "match");
-    assert_eq!(report["bit_errors"], 0);
-    assert!(report["p_value_log10"].as_f64().unwrap() < -12.0);
-    report
-}
+use serde_json::{Value, json};
 
 /// A host with a map and the copy of it that ACME GmbH got.
 fn marked(fixture: &str, options: &[&str]) -> Host {
@@ -52,7 +34,7 @@ fn the_message_is_read_from_every_common_format() {
         let options: &[&str] =
             if output.contains(".geojson") || output.contains(".fgb") { &one_layer } else { &all };
         host.mark(format, output, "map.gpkg", options).succeeds();
-        matches(&host, "map.gpkg", &["--record", "acme.json", output]);
+        host.matches("map.gpkg", &["--record", "acme.json", output]);
     }
 }
 
@@ -60,13 +42,13 @@ fn the_message_is_read_from_every_common_format() {
 fn the_message_is_read_without_a_record() {
     let host = marked("helsinki.gpkg", &["-oo", "CHIP_RATE=3", "-oo", "AMPLITUDE=0.15"]);
     let how = ["--chip-rate", "3", "--amplitude", "0.15"];
-    matches(&host, "map.gpkg", &[&how[..], &["--recipient", "ACME GmbH", "marked.gpkg"]].concat());
+    host.matches("map.gpkg", &[&how[..], &["--recipient", "ACME GmbH", "marked.gpkg"]].concat());
     let message = host.key().recipient_message("ACME GmbH").to_hex();
-    let report = matches(&host, "map.gpkg", &[&how[..], &["--message", &message, "marked.gpkg"]].concat());
+    let report = host.matches("map.gpkg", &[&how[..], &["--message", &message, "marked.gpkg"]].concat());
     assert_eq!(report["message"], message.as_str());
 
     // Nothing is expected: the message is decoded all the same, and nobody is accused.
-    let (run, report) = verify(&host, "map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
+    let (run, report) = host.verify("map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
     assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
     assert_eq!(report["message"], message.as_str());
     assert!(report["bit_errors"].is_null() && report["p_value_log10"].is_null());
@@ -77,7 +59,7 @@ fn a_coded_message_is_read_with_a_record_and_without() {
     let host = marked("kotka.gpkg", &["-oo", "CODE=LDPC"]);
     let how = ["--code", "ldpc", "--recipient", "ACME GmbH", "marked.gpkg"];
     for more in [&["--record", "acme.json", "marked.gpkg"][..], &how[..]] {
-        let report = matches(&host, "map.gpkg", more);
+        let report = host.matches("map.gpkg", more);
         assert_eq!(
             (&report["parameters"]["code"], &report["parameters"]["chip_rate"]),
             (&"ldpc".into(), &1.into())
@@ -87,21 +69,21 @@ fn a_coded_message_is_read_with_a_record_and_without() {
         assert_eq!(report["bits"].as_array().unwrap().len(), 128);
     }
     // Under another code there is no such mark.
-    let (run, report) = verify(&host, "map.gpkg", &["--recipient", "ACME GmbH", "marked.gpkg"]);
+    let (run, report) = host.verify("map.gpkg", &["--recipient", "ACME GmbH", "marked.gpkg"]);
     assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
 }
 
 #[test]
 fn one_layer_of_many_can_be_marked_and_verified() {
     let host = marked("helsinki.gpkg", &["-oo", "LAYERS=buildings,roads"]);
-    let report = matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
+    let report = host.matches("map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
     assert_eq!(report["parameters"]["layers"], serde_json::json!(["buildings", "roads"]));
 }
 
 #[test]
 fn a_map_in_degrees_is_marked_and_read_in_metres() {
     let host = marked("europe_deg.gpkg", &[]);
-    let report = matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
+    let report = host.matches("map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
     let rms_m = report["registration"]["rms_m"].as_f64().unwrap();
     assert!((0.05..0.15).contains(&rms_m), "{rms_m}");
 }
@@ -109,7 +91,7 @@ fn a_map_in_degrees_is_marked_and_read_in_metres() {
 #[test]
 fn points_z_m_curves_and_surfaces_carry_a_message() {
     let host = marked("shapes.gpkg", &[]);
-    matches(&host, "map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
+    host.matches("map.gpkg", &["--record", "acme.json", "marked.gpkg"]);
 }
 
 #[test]
@@ -117,7 +99,7 @@ fn shuffled_features_carry_the_message() {
     let host = marked("helsinki.gpkg", &[]);
     let map = Map::read(&host.path("marked.gpkg")).unwrap();
     features::scramble(&map, 5).write(&host.path("shuffled.gpkg")).unwrap();
-    matches(&host, "map.gpkg", &["--record", "acme.json", "shuffled.gpkg"]);
+    host.matches("map.gpkg", &["--record", "acme.json", "shuffled.gpkg"]);
 }
 
 #[test]
@@ -129,8 +111,7 @@ fn a_translated_rotated_scaled_copy_is_found_by_its_landmarks() {
         similarity::linear(&turned, similarity::scaling(5.5, 5.5), similarity::About::Corner).unwrap();
     similarity::translate(&scaled, [1000.0, -500.0]).write(&host.path("moved.gpkg")).unwrap();
     for landmark in [&[][..], &["--landmark", "name", "--landmark", "osm_id"][..]] {
-        let report =
-            matches(&host, "map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
+        let report = host.matches("map.gpkg", &[landmark, &["--record", "acme.json", "moved.gpkg"]].concat());
         assert_eq!(report["registration"]["method"], "landmarks");
         assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
         assert!(report["registration"]["rms_m"].as_f64().unwrap() < 0.12);
@@ -146,7 +127,7 @@ fn landmarks_are_fields_of_the_reference_and_match_any_field_of_the_suspect_by_v
     host.run("ogr2ogr", &["renamed.shp", "moved.gpkg", "-dialect", "OGRSQL", "-sql", renamed]).succeeds();
     let more =
         ["--landmark", "osm_id", "--registration", "landmarks", "--record", "acme.json", "renamed.shp"];
-    let report = matches(&host, "map.gpkg", &more);
+    let report = host.matches("map.gpkg", &more);
     assert!(report["registration"]["landmarks"].as_u64().unwrap() > 50);
 }
 
@@ -158,7 +139,7 @@ fn the_paper_counts_only_the_vertices_within_the_radius() {
     bent.write(&host.path("bent.gpkg")).unwrap();
     let matched = |demodulator: &str| {
         let how = ["--record", "acme.json", "--demodulator", demodulator, "bent.gpkg"];
-        verify(&host, "map.gpkg", &how).1["vertices"]["matched"].as_u64().unwrap()
+        host.verify("map.gpkg", &how).1["vertices"]["matched"].as_u64().unwrap()
     };
     let (paper, joint) = (matched("paper"), matched("joint"));
     assert!(0 < paper && paper < joint, "{paper} {joint}: the joint demodulator follows the deformation");
@@ -169,8 +150,117 @@ fn a_suspect_in_another_crs_is_reprojected() {
     let host = marked("helsinki.gpkg", &[]);
     for srs in ["EPSG:4326", "EPSG:3857", "EPSG:2393"] {
         host.run("ogr2ogr", &["-t_srs", srs, "other.gpkg", "marked.gpkg", "-overwrite"]);
-        matches(&host, "map.gpkg", &["--record", "acme.json", "other.gpkg"]);
+        host.matches("map.gpkg", &["--record", "acme.json", "other.gpkg"]);
     }
+}
+
+/// The marked map's coordinates in an EPSG CRS, perhaps y before x, under a label of another CRS or none.
+fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
+    let mut map = reproject::reproject(&Map::read(&host.path("marked.gpkg")).unwrap(), epsg, None).unwrap();
+    if swapped {
+        map = map.map_coords(|[x, y]| [y, x]);
+    }
+    let label = label.map(|epsg| SpatialRef::from_epsg(epsg).unwrap().to_wkt().unwrap());
+    map.layers.iter_mut().for_each(|layer| layer.crs = label.clone());
+    let _ = std::fs::remove_file(host.path("suspect.gpkg"));
+    map.write(&host.path("suspect.gpkg")).unwrap();
+}
+
+/// What the report says of these coordinates. EPSG:3067, the reference's own, is UTM zone 35 by another name.
+fn read_as(epsg: u32, swapped: bool) -> Value {
+    let epsg = if epsg == 32635 { 3067 } else { epsg };
+    json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped })
+}
+
+#[test]
+fn a_missing_crs_is_found_among_the_likely_ones() {
+    let host = marked("kotka.gpkg", &[]);
+    // Degrees, web maps, UTM, Finland's older grid, its GK27 grid.
+    for epsg in [4326, 3857, 32635, 2393, 3881] {
+        for swapped in [false, true] {
+            mislabelled(&host, epsg, swapped, None);
+            let report = host.matches("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+            assert_eq!(report["registration"]["read_as"], read_as(epsg, swapped));
+            assert_eq!(report["registration"]["method"], "identity");
+        }
+    }
+    mislabelled(&host, 3067, false, None);
+    let report = host.matches("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+    assert_eq!(report["registration"]["read_as"]["crs"], "EPSG:3067");
+}
+
+#[test]
+fn a_wrong_crs_is_seen_and_the_right_one_found() {
+    let host = marked("kotka.gpkg", &[]);
+    for (epsg, swapped, label) in [
+        (3067, false, 4326),
+        (4326, false, 3857),
+        (3857, false, 3067),
+        (32635, false, 32636),
+        (4326, true, 4326),
+        (2393, false, 3067),
+    ] {
+        mislabelled(&host, epsg, swapped, Some(label));
+        let report = host.matches("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+        assert_eq!(report["registration"]["read_as"], read_as(epsg, swapped), "labelled EPSG:{label}");
+    }
+}
+
+#[test]
+fn the_assumed_crs_is_told_to_people_too() {
+    let host = marked("kotka.gpkg", &[]);
+    mislabelled(&host, 4326, true, None);
+    let command = library().with_file_name("meshmark");
+    let arguments = ["verify", "--explain", "--key", "key.json", "--reference", "map.gpkg", "suspect.gpkg"];
+    let text = host.run(command.to_str().unwrap(), &arguments).stdout;
+    assert!(text.contains("registration: identity, read as EPSG:4326 with x and y exchanged"), "{text}");
+    let sentence = "The suspect has no CRS; its coordinates were read as EPSG:4326 with x and y exchanged.";
+    assert!(text.contains(sentence), "{text}");
+}
+
+#[test]
+fn a_suspect_without_anything_or_elsewhere_is_inconclusive() {
+    let host = marked("kotka.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    let mut empty = map.clone();
+    empty.layers.iter_mut().for_each(|layer| layer.features.clear());
+    let elsewhere = features::drop_attributes(&Map::read(&host.path("map.gpkg")).unwrap());
+    let few =
+        elsewhere.map_geometries(|geometry| geometry.coords_iter().next().map(|c| geo::Point(c).into()));
+    let few = features::delete(&similarity::translate(&few, [5e4, 5e4]), 0.9, 1);
+    for (suspect, file) in [(empty, "empty.gpkg"), (few, "few_points_elsewhere.gpkg")] {
+        suspect.write(&host.path(file)).unwrap();
+        for registration in ["auto", "landmarks", "geometry", "none"] {
+            let flags = ["--record", "acme.json", "--registration", registration, file];
+            let (run, report) = host.verify("map.gpkg", &flags);
+            assert_eq!(
+                (run.code, &report["verdict"]),
+                (Some(3), &Value::from("inconclusive")),
+                "{}",
+                run.stderr
+            );
+            let reason = report["reason"].as_str().unwrap();
+            assert!(reason.contains("nothing to compare") || reason.contains("another map"), "{report}");
+        }
+    }
+}
+
+#[test]
+fn vertices_as_points_carry_the_message() {
+    let host = marked("kotka.gpkg", &[]);
+    let map = Map::read(&host.path("marked.gpkg")).unwrap();
+    let points = |geometry: &geo::Geometry| {
+        let points = geometry.coords_iter().map(geo::Point::from).collect();
+        Some(geo::MultiPoint(points).into())
+    };
+    let turned = similarity::linear(
+        &map.map_geometries(points),
+        similarity::rotation(30.0),
+        similarity::About::Corner,
+    );
+    features::drop_attributes(&turned.unwrap()).write(&host.path("points.gpkg")).unwrap();
+    let report = host.matches("map.gpkg", &["--record", "acme.json", "points.gpkg"]);
+    assert_eq!(report["registration"]["method"], "geometry");
 }
 
 #[test]
@@ -180,11 +270,11 @@ fn nobody_is_accused_by_a_wrong_key_an_unmarked_map_another_map_or_another_recip
     std::fs::write(host.path("other_key.json"), other_key.to_json().as_bytes()).unwrap();
     host.copy("kotka.gpkg", "kotka.gpkg");
 
-    let (_, report) = verify(&host, "map.gpkg", &["--recipient", "Somebody Else", "marked.gpkg"]);
+    let (_, report) = host.verify("map.gpkg", &["--recipient", "Somebody Else", "marked.gpkg"]);
     assert_eq!(report["verdict"], "no-match");
-    let (run, report) = verify(&host, "map.gpkg", &["--record", "acme.json", "map.gpkg"]);
+    let (run, report) = host.verify("map.gpkg", &["--record", "acme.json", "map.gpkg"]);
     assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
-    let (run, report) = verify(&host, "map.gpkg", &["--record", "acme.json", "kotka.gpkg"]);
+    let (run, report) = host.verify("map.gpkg", &["--record", "acme.json", "kotka.gpkg"]);
     assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
 
     let command = library().with_file_name("meshmark");

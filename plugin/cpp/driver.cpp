@@ -34,8 +34,7 @@ static GDALDataset *Open(GDALOpenInfo *info)
     }
     if (info->eAccess == GA_Update)
     {
-        CPLError(CE_Failure, CPLE_OpenFailed, "%s cannot be opened for update: it is a view that can only be read",
-                 name);
+        meshmark_writer_refuse_update(name + strlen(MESHMARK_PREFIX));
         return nullptr;
     }
     try
@@ -52,11 +51,36 @@ static GDALDataset *Open(GDALOpenInfo *info)
     }
 }
 
+static GDALDataset *Create(const char *name, int, int, int bands, GDALDataType, char **options)
+{
+    if (!HasPrefix(name))
+    {
+        meshmark_writer_refuse_bare(name);
+        return nullptr;
+    }
+    if (bands > 0)
+    {
+        CPLError(CE_Failure, CPLE_NotSupported, "%s: a marked map has no raster bands", name);
+        return nullptr;
+    }
+    try
+    {
+        GDALDatasetH schema = nullptr;
+        MeshmarkWriter *writer = meshmark_writer_new(name + strlen(MESHMARK_PREFIX), options, &schema);
+        return writer ? new MeshmarkOutputDataset(GDALDataset::FromHandle(schema), writer) : nullptr;
+    }
+    catch (const std::exception &e)
+    {
+        ReportException(e.what());
+        return nullptr;
+    }
+}
+
+// GDAL deletes what bears the name of a dataset before it creates it, and goes on when that fails. What is in
+// the way of a marked map is Create's to judge, so nothing is said here.
 static CPLErr Delete(const char *name)
 {
-    if (HasPrefix(name))
-        CPLError(CE_Failure, CPLE_NotSupported, "%s is a view of a dataset: delete the dataset itself", name);
-    else
+    if (!HasPrefix(name))
         meshmark_refuse_to_write(name, true); // some writers go on and truncate the file
     return CE_Failure;
 }
@@ -65,17 +89,24 @@ static GDALDriver *NewDriver()
 {
     auto driver = std::make_unique<GDALDriver>();
     driver->SetDescription(MESHMARK_DRIVER);
-    driver->SetMetadataItem(GDAL_DMD_LONGNAME, "Watermarked view of a vector map");
+    driver->SetMetadataItem(GDAL_DMD_LONGNAME, "Watermarked vector map");
     driver->SetMetadataItem(GDAL_DMD_HELPTOPIC, "docs/driver.md");
     driver->SetMetadataItem(GDAL_DMD_CONNECTION_PREFIX, MESHMARK_PREFIX);
     driver->SetMetadataItem(GDAL_DMD_OPENOPTIONLIST, meshmark_option_list());
+    driver->SetMetadataItem(GDAL_DMD_CREATIONOPTIONLIST, meshmark_creation_option_list());
+    // What a format lacks of these its own driver says: see MeshmarkOutputDataset.
+    driver->SetMetadataItem(GDAL_DMD_CREATIONFIELDDATATYPES,
+                            "Integer Integer64 Real String Date DateTime Time Binary IntegerList Integer64List "
+                            "RealList StringList");
+    driver->SetMetadataItem(GDAL_DMD_CREATIONFIELDDATASUBTYPES, "Boolean Int16 Float32 JSON UUID");
     for (const char *capability :
-         {GDAL_DCAP_VECTOR, GDAL_DCAP_VIRTUALIO, GDAL_DCAP_FIELD_DOMAINS, GDAL_DCAP_RELATIONSHIPS,
+         {GDAL_DCAP_CREATE, GDAL_DCAP_CREATE_LAYER, GDAL_DCAP_CREATE_FIELD, GDAL_DCAP_VECTOR, GDAL_DCAP_VIRTUALIO, GDAL_DCAP_FIELD_DOMAINS, GDAL_DCAP_RELATIONSHIPS,
           GDAL_DCAP_Z_GEOMETRIES, GDAL_DCAP_MEASURED_GEOMETRIES, GDAL_DCAP_CURVE_GEOMETRIES,
           GDAL_DCAP_FEATURE_STYLES, GDAL_DCAP_MULTIPLE_VECTOR_LAYERS})
         driver->SetMetadataItem(capability, "YES");
     driver->pfnIdentify = Identify;
     driver->pfnOpen = Open;
+    driver->pfnCreate = Create;
     driver->pfnDelete = Delete;
     return driver.release();
 }
@@ -93,6 +124,24 @@ void meshmark_shim_register()
     {
         ReportException(e.what());
     }
+}
+
+GDALDatasetH meshmark_shim_view(GDALDatasetH source, MeshmarkMarking *marking)
+{
+    try
+    {
+        return GDALDataset::ToHandle(new MeshmarkDataset(GDALDataset::FromHandle(source), marking));
+    }
+    catch (const std::exception &e)
+    {
+        ReportException(e.what());
+        return nullptr;
+    }
+}
+
+char *meshmark_shim_list_as_json(OGRFeatureH feature, int field)
+{
+    return OGRFeature::FromHandle(feature)->GetFieldAsSerializedJSon(field);
 }
 
 GDALDatasetH meshmark_shim_filter(GDALDatasetH source, CSLConstList options)

@@ -54,8 +54,38 @@ extern "C"
     bool meshmark_is_being_read(const char *name);
     // Says that it is being read, and first saves a copy if something may write to it all the same.
     void meshmark_refuse_to_write(const char *name, bool copy_first);
-    // The XML list of open options; lives as long as the process.
+    // The XML lists of open and creation options; they live as long as the process.
     const char *meshmark_option_list();
+    const char *meshmark_creation_option_list();
+}
+
+// --- from C++ to Rust, while a host writes (src/ffi_writer.rs) -------------------------------------
+
+struct MeshmarkWriter; // what Rust knows of a dataset under construction
+
+extern "C"
+{
+    // Begins the file `name`; nullptr on failure. *schema is an empty dataset of the real driver that lives as
+    // long as the writer.
+    MeshmarkWriter *meshmark_writer_new(const char *name, CSLConstList options, GDALDatasetH *schema);
+    // Creates a layer; the empty one of the real driver, nullptr on failure.
+    OGRLayerH meshmark_writer_add_layer(MeshmarkWriter *, const char *name, OGRSpatialReferenceH,
+                                        OGRwkbGeometryType, CSLConstList options);
+    bool meshmark_writer_add_field(MeshmarkWriter *, int layer, OGRFieldDefnH, bool approximate);
+    // Takes a feature and sets its id.
+    bool meshmark_writer_write(MeshmarkWriter *, int layer, OGRFeatureH);
+    void meshmark_writer_begin(MeshmarkWriter *);
+    // False when no transaction is open.
+    bool meshmark_writer_commit(MeshmarkWriter *);
+    void meshmark_writer_roll_back(MeshmarkWriter *);
+    // Marks and publishes, unless `host_failure` says that the host failed; frees the writer. Metadata and
+    // styles are those of `described`.
+    bool meshmark_writer_finish(MeshmarkWriter *, GDALDatasetH described, const char *host_failure);
+
+    // Says why a marked map is not opened for update.
+    void meshmark_writer_refuse_update(const char *name);
+    // Says that the name lacks the prefix.
+    void meshmark_writer_refuse_bare(const char *name);
 }
 
 struct MeshmarkFree
@@ -168,6 +198,88 @@ class MeshmarkDataset final : public GDALDataset
     std::vector<std::unique_ptr<MeshmarkLayer>> m_layers;
 };
 
+// --- the write side ------------------------------------------------------------------------------
+// Hosts see what the real driver makes of layers and fields; features go to Rust.
+
+class MeshmarkOutputDataset;
+
+class MeshmarkOutputLayer final : public OGRLayer
+{
+  public:
+    MeshmarkOutputLayer(MeshmarkOutputDataset &dataset, OGRLayer &schema, int number);
+
+    void ResetReading() override {}
+    OGRFeature *GetNextFeature() override { return nullptr; }
+    int TestCapability(const char *capability) MESHMARK_CONST override;
+#if MESHMARK_GDAL_AT_LEAST(9)
+    OGRErr CreateField(const OGRFieldDefn *field, int approximate) override;
+#else
+    OGRErr CreateField(OGRFieldDefn *field, int approximate) override;
+#endif
+    OGRErr StartTransaction() override;
+    OGRErr CommitTransaction() override;
+    OGRErr RollbackTransaction() override;
+
+    // Handed on as they are.
+    const char *GetName() MESHMARK_CONST override { return m_schema.GetName(); }
+    OGRwkbGeometryType GetGeomType() MESHMARK_CONST override { return m_schema.GetGeomType(); }
+    MESHMARK_CONST OGRFeatureDefn *GetLayerDefn() MESHMARK_CONST override { return m_schema.GetLayerDefn(); }
+    MESHMARK_CONST OGRSpatialReference *GetSpatialRef() MESHMARK_CONST override { return m_schema.GetSpatialRef(); }
+    const char *GetFIDColumn() MESHMARK_CONST override { return m_schema.GetFIDColumn(); }
+    const char *GetGeometryColumn() MESHMARK_CONST override { return m_schema.GetGeometryColumn(); }
+    int FindFieldIndex(const char *name, int exact) override { return m_schema.FindFieldIndex(name, exact); }
+    GDALDataset *GetDataset() override;
+
+  protected:
+    OGRErr ICreateFeature(OGRFeature *feature) override;
+
+  private:
+    MeshmarkOutputDataset &m_dataset;
+    OGRLayer &m_schema;
+    const int m_number;
+};
+
+class MeshmarkOutputDataset final : public GDALDataset
+{
+  public:
+    // Takes over `writer`, to which `schema` belongs.
+    MeshmarkOutputDataset(GDALDataset *schema, MeshmarkWriter *writer);
+    ~MeshmarkOutputDataset() override;
+
+    int GetLayerCount() MESHMARK_CONST override { return static_cast<int>(m_layers.size()); }
+    MESHMARK_CONST OGRLayer *GetLayer(int index) MESHMARK_CONST override;
+    int TestCapability(const char *capability) MESHMARK_CONST override;
+    OGRErr StartTransaction(int force) override;
+    OGRErr CommitTransaction() override;
+    OGRErr RollbackTransaction() override;
+
+    const OGRFieldDomain *GetFieldDomain(const std::string &name) const override;
+    bool AddFieldDomain(std::unique_ptr<OGRFieldDomain> &&domain, std::string &reason) override;
+
+#if MESHMARK_GDAL_AT_LEAST(7)
+    CPLErr Close() override;
+#endif
+    // For a call that writes. GDAL's last failure after it is one that came after it: Finish looks for that.
+    MeshmarkWriter *Writer();
+
+  protected:
+#if MESHMARK_GDAL_AT_LEAST(9)
+    OGRLayer *ICreateLayer(const char *name, const OGRGeomFieldDefn *geometry, CSLConstList options) override;
+#else
+    OGRLayer *ICreateLayer(const char *name, OGRSpatialReference *srs, OGRwkbGeometryType type,
+                           char **options) override;
+#endif
+
+  private:
+    OGRLayer *AddLayer(const char *name, const OGRSpatialReference *srs, OGRwkbGeometryType type,
+                       CSLConstList options);
+    bool Finish();
+
+    GDALDataset *m_schema;
+    MeshmarkWriter *m_writer;
+    std::vector<std::unique_ptr<MeshmarkOutputLayer>> m_layers;
+};
+
 // --- from Rust to C++ ----------------------------------------------------------------------------
 // rustc hides the symbols of a C++ archive, so the public functions are Rust's and come here.
 
@@ -175,4 +287,8 @@ extern "C"
 {
     void meshmark_shim_register();
     GDALDatasetH meshmark_shim_filter(GDALDatasetH source, CSLConstList options);
+    // A marked dataset that takes over a reference to `source`, and `marking`.
+    GDALDatasetH meshmark_shim_view(GDALDatasetH source, MeshmarkMarking *marking);
+    // A list field as a JSON array; the caller frees it. nullptr when it is not set.
+    char *meshmark_shim_list_as_json(OGRFeatureH feature, int field);
 }

@@ -33,7 +33,7 @@ pub enum Error {
     Geometry { layer: String, fid: i64, reason: String },
     #[error("the output {path} is the source itself: write the marked map to another place")]
     OutputIsSource { path: String },
-    #[error("the value of option {0} is not UTF-8, so two names could become one: write it in UTF-8")]
+    #[error("{0} is not UTF-8, so two names could become one: write it in UTF-8")]
     NotUtf8(String),
     #[error("option \"{0}\" is not NAME=VALUE")]
     NotAnOption(String),
@@ -58,6 +58,47 @@ pub enum Error {
     RecordUnwritable { path: String, reason: String },
     #[error("no threads can be started ({0}): set GDAL_NUM_THREADS=1")]
     Threads(String),
+    #[error(
+        "it is no name to write to: write MESHMARK: and then the name of a file, for example MESHMARK:{0}"
+    )]
+    BareTarget(String),
+    #[error(
+        "it cannot be opened for update, as a marked map cannot be extended: leave -append, -update and -overwrite \
+         out{overwrite}"
+    )]
+    Extended { overwrite: &'static str },
+    #[error("{path} is {what}: a marked map is written to a file of its own, in a folder that exists")]
+    NotAFile { path: String, what: &'static str },
+    #[error("{path} exists: {remedy}")]
+    Exists { path: String, remedy: &'static str },
+    #[error("{path} is being written by another program ({sidecar} is there): wait until it is done")]
+    TargetBusy { path: String, sidecar: String },
+    #[error("{option} and {other} are the same file: give each a file of its own")]
+    SameFile { option: &'static str, other: &'static str },
+    #[error("REFERENCE={0} is written as GeoPackage: give it a name that ends in .gpkg")]
+    ReferenceNotGeoPackage(String),
+    #[error("{what} is not a format that a marked map is written to: use FORMAT= {known}")]
+    UnknownFormat { what: String, known: String },
+    #[error("{driver} holds one layer, and this is the second: choose one, or write a GeoPackage")]
+    OneLayer { driver: &'static str },
+    #[error("{driver} would make a folder of it: write one layer, or a GeoPackage")]
+    Folder { driver: &'static str },
+    #[error("{what} failed: {reason}")]
+    Writing { what: String, reason: String },
+    #[error("{action} {path} failed: {reason}")]
+    File { action: &'static str, path: String, reason: String },
+    #[error("{0}: nothing is written, what was there stays as it was")]
+    Unfinished(String),
+    #[error(
+        "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; choose \
+         another format or its options"
+    )]
+    NotKept { driver: &'static str, layer: String, difference: String },
+    #[error(
+        "only all but {errors} of {bits} bits of the message can be read from what was written: raise AMPLITUDE, or \
+         choose a format that keeps more digits"
+    )]
+    MessageUnreadable { errors: usize, bits: usize },
     #[error(transparent)]
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]

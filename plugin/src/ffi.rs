@@ -5,11 +5,11 @@ use crate::{
     error::{Error, Result},
     ffi_errors::{Collector, guarded, report, silence_panics},
     ffi_source::{Borrowed, OwnedSource, strings, text},
-    marking::{Marking, NotMoved, Request, Source},
+    marking::{Marking, NotMoved, Request, Source, split_options},
     source_files::{is_being_read, save_copies},
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
-use meshmark_core::options::option_list_xml;
+use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
 use std::{
     ffi::{CString, c_char},
     path::Path,
@@ -72,10 +72,11 @@ unsafe extern "C" fn meshmark_open(
     guarded(ptr::null_mut(), || {
         // SAFETY: the shim gives a C string, an option list and the address of a handle.
         let (name, options, source) = unsafe { (text(name), strings(options), &mut *source) };
-        let opened = Request::new(&options, default_key_path()).and_then(|request| {
+        let opened = request(&options).and_then(|request| {
             let opened = OwnedSource::open(&name)?;
             // SAFETY: `opened` outlives the borrow.
             let marking = mark(name.clone(), &request, &unsafe { Borrowed::new(opened.handle()) })?;
+            marking.write_record(&request)?;
             *source = opened.into_handle();
             Ok(marking)
         });
@@ -89,9 +90,13 @@ unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) ->
     guarded(ptr::null_mut(), || {
         // SAFETY: the shim gives an open dataset and an option list.
         let (source, options) = unsafe { (Borrowed::new(source), strings(options)) };
-        let request = Request::new(&options, default_key_path());
         let name = source.name();
-        hand_over(&name, request.and_then(|request| mark(name.clone(), &request, &source)))
+        let marking = request(&options).and_then(|request| {
+            let marking = mark(name.clone(), &request, &source)?;
+            marking.write_record(&request)?;
+            Ok(marking)
+        });
+        hand_over(&name, marking)
     })
 }
 
@@ -172,15 +177,27 @@ unsafe extern "C" fn meshmark_refuse_to_write(name: *const c_char, copy_first: b
 extern "C" fn meshmark_option_list() -> *const c_char {
     static LIST: OnceLock<CString> = OnceLock::new();
     guarded(c"".as_ptr(), || {
-        LIST.get_or_init(|| CString::new(option_list_xml()).expect("it has no NUL")).as_ptr()
+        LIST.get_or_init(|| CString::new(open_option_list_xml()).expect("it has no NUL")).as_ptr()
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn meshmark_creation_option_list() -> *const c_char {
+    static LIST: OnceLock<CString> = OnceLock::new();
+    guarded(c"".as_ptr(), || {
+        LIST.get_or_init(|| CString::new(creation_option_list_xml()).expect("it has no NUL")).as_ptr()
     })
 }
 
 // --- helpers -------------------------------------------------------------------------------------
 
+fn request(options: &[String]) -> Result<Request> {
+    Request::new(&split_options(options)?, default_key_path())
+}
+
 /// Marks the dataset, with GDAL's own messages collected instead of emitted: streaming will emit
 /// those that matter again.
-fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Marking> {
+pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
     }
@@ -208,16 +225,16 @@ fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
     }
 }
 
-fn fail(name: &str, error: &Error) {
+pub fn fail(name: &str, error: &Error) {
     report(CPLErr::CE_Failure, format!("MESHMARK:{name}: {error}"));
 }
 
-fn default_key_path() -> Option<String> {
+pub fn default_key_path() -> Option<String> {
     Some(config_option(c"MESHMARK_KEY".to_owned())).filter(|path| !path.is_empty())
 }
 
 /// GDAL_NUM_THREADS, which is ALL_CPUS or a number.
-fn threads() -> usize {
+pub fn threads() -> usize {
     let all = available_parallelism().map_or(1, usize::from);
     config_option(c"GDAL_NUM_THREADS".to_owned()).parse().map_or(all, |threads: usize| threads.clamp(1, 256))
 }

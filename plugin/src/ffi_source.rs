@@ -3,17 +3,24 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
+    ffi_output::Feature,
+    marking::Marking,
     source_files::SourceFiles,
 };
 use gdal::{Dataset, GdalOpenFlags};
 use gdal_sys::{GDALDatasetH, OGRLayerH};
 use std::{
-    ffi::{CStr, CString, c_char},
+    ffi::{CStr, CString, c_char, c_void},
     mem::ManuallyDrop,
     ops::Deref,
     path::PathBuf,
     ptr,
 };
+
+unsafe extern "C" {
+    /// A marked dataset that takes over a reference to `source`, and `marking`.
+    fn meshmark_shim_view(source: GDALDatasetH, marking: *mut c_void) -> GDALDatasetH;
+}
 
 const PREFIX: &str = "MESHMARK:";
 const DRIVER: &CStr = c"MESHMARK";
@@ -66,6 +73,66 @@ impl Drop for OwnedSource {
     fn drop(&mut self) {
         // SAFETY: the handle is open and this reference is ours.
         unsafe { gdal_sys::GDALReleaseDataset(self.0) };
+    }
+}
+
+/// A marked dataset: the read side of the driver, in this process.
+pub struct View {
+    handle: GDALDatasetH,
+    marking: *const Marking,
+}
+
+impl View {
+    pub fn new(source: OwnedSource, marking: Marking) -> Result<Self> {
+        let marking = Box::into_raw(Box::new(marking));
+        let collector = Collector::new();
+        // SAFETY: both are given away; the marking lives as long as the view.
+        let handle = unsafe { meshmark_shim_view(source.into_handle(), marking.cast()) };
+        match (handle.is_null(), collector.first_failure()) {
+            (false, _) => Ok(View { handle, marking }),
+            (true, reason) => Err(Error::SourceUnopened(reason.unwrap_or_default())),
+        }
+    }
+
+    pub fn marking(&self) -> &Marking {
+        // SAFETY: the view owns it.
+        unsafe { &*self.marking }
+    }
+
+    pub fn dataset(&self) -> Borrowed {
+        // SAFETY: callers drop it before the view, as its users in this crate do within one function.
+        unsafe { Borrowed::new(self.handle) }
+    }
+
+    /// Calls `f` with every feature of a layer.
+    pub fn for_each(&self, layer: &str, mut f: impl FnMut(Feature) -> Result<()>) -> Result<()> {
+        let name = CString::new(layer).expect("it was a C string");
+        let collector = Collector::new();
+        // SAFETY: the dataset is open, the name is a C string, and features are the caller's to destroy.
+        unsafe {
+            let layer = gdal_sys::GDALDatasetGetLayerByName(self.handle, name.as_ptr());
+            if !layer.is_null() {
+                gdal_sys::OGR_L_ResetReading(layer);
+                loop {
+                    let feature = gdal_sys::OGR_L_GetNextFeature(layer);
+                    if feature.is_null() {
+                        break;
+                    }
+                    f(Feature::from_handle(feature))?;
+                }
+            }
+        }
+        match collector.first_failure() {
+            None => Ok(()),
+            Some(reason) => Err(Error::Writing { what: format!("reading layer \"{layer}\" again"), reason }),
+        }
+    }
+}
+
+impl Drop for View {
+    fn drop(&mut self) {
+        // SAFETY: the dataset is open and ours.
+        unsafe { gdal_sys::GDALClose(self.handle) };
     }
 }
 

@@ -8,6 +8,8 @@
 //!                             dataset::survey, core::embedding
 //! ```
 //!
+//! Writing stages what a host writes, and marks it when the host closes the dataset: [`writer`] has the picture.
+//!
 //! Opening computes the mark: the vertex table and its new coordinates are all that is held in
 //! memory. Features stream through the C++ layer, which hands each geometry to [`marking`] as WKB.
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -16,8 +18,16 @@
 mod error;
 mod ffi;
 mod ffi_errors;
+mod ffi_output;
 mod ffi_source;
+mod ffi_writer;
+mod formats;
 mod marking;
 mod output;
+mod publication;
+mod read_back;
 mod record_file;
 mod source_files;
+mod target;
+mod workplace;
+mod writer;

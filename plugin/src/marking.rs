@@ -7,10 +7,14 @@ use crate::{
 };
 use gdal::Dataset;
 use meshmark_core::{
+    carrier::Carrier,
+    demodulation,
     embedding::{self, Marked},
+    ground::Ground,
     key::SecretKey,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Subject},
+    patches::Patches,
     record::{self, Record, Reference, TopologyEntry},
     vertices::VertexTable,
 };
@@ -24,27 +28,32 @@ const HINTS_OF_GDAL: [&str; 3] = ["NATIVE_DATA", "VALIDATE_OPEN_OPTIONS", "NOLOC
 /// A key file has 150 bytes; a mistaken /dev/zero has no end.
 const LONGEST_KEY_FILE: u64 = 65_536;
 
+/// Splits NAME=VALUE texts.
+pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
+    let split = |text: &String| match text.split_once('=') {
+        // Bytes that are no text have become this character on their way here.
+        Some((name, value)) if value.contains(char::REPLACEMENT_CHARACTER) => {
+            Err(Error::NotUtf8(format!("the value of option {name}")))
+        }
+        Some((name, value)) => Ok((name.to_string(), value.to_string())),
+        None => Err(Error::NotAnOption(text.clone())),
+    };
+    texts.iter().map(split).collect()
+}
+
 /// The options of one marking, checked as far as that is possible without the map.
 pub struct Request {
     options: Options,
     subject: Subject,
     key: SecretKey,
+    key_path: String,
 }
 
 impl Request {
-    /// Parses NAME=VALUE pairs and reads the key file. `default_key_path` serves when no KEY is given.
-    pub fn new(pairs: &[String], default_key_path: Option<String>) -> Result<Self> {
-        let split = |pair: &'_ String| match pair.split_once('=') {
-            Some((name, value)) => Ok((name.to_string(), value.to_string())),
-            None => Err(Error::NotAnOption(pair.clone())),
-        };
-        let pairs: Vec<(String, String)> = pairs.iter().map(split).collect::<Result<_>>()?;
+    /// Parses the options and reads the key file. `default_key_path` serves when no KEY is given.
+    pub fn new(pairs: &[(String, String)], default_key_path: Option<String>) -> Result<Self> {
         let ours =
             pairs.iter().filter(|(name, _)| !HINTS_OF_GDAL.iter().any(|h| h.eq_ignore_ascii_case(name)));
-        // Bytes that are no text have become this character on their way here.
-        if let Some((name, _)) = pairs.iter().find(|(_, value)| value.contains(char::REPLACEMENT_CHARACTER)) {
-            return Err(Error::NotUtf8(name.clone()));
-        }
         let options = Options::parse(ours.map(|(name, value)| (name.as_str(), value.as_str())))?;
         let subject = options.subject.clone().ok_or(Error::NoSubject)?;
         let key_path = options.key_path.clone().or(default_key_path).ok_or(Error::NoKey)?;
@@ -56,8 +65,23 @@ impl Request {
                 return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
-        Ok(Request { options, subject, key })
+        Ok(Request { options, subject, key, key_path })
     }
+
+    /// Where the record shall go.
+    pub fn record_path(&self) -> Option<&Path> {
+        self.options.record_path.as_deref().map(Path::new)
+    }
+
+    /// Where the key came from.
+    pub fn key_path(&self) -> &Path {
+        Path::new(&self.key_path)
+    }
+}
+
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Error::Threads(error.to_string()))
 }
 
 fn read_key(path: &str) -> Result<SecretKey> {
@@ -84,16 +108,18 @@ pub struct Source<'a> {
 pub struct Marking {
     /// What to call the source in messages.
     pub name: String,
-    table: VertexTable,
+    map: Survey,
     moved: Vec<[f64; 2]>,
     layers: Option<Vec<String>>,
     files: SourceFiles,
+    /// The text of its record.
+    pub record: String,
     /// Sentences the user should read though nothing failed.
     pub warnings: Vec<String>,
 }
 
 impl Marking {
-    /// Surveys the source, computes every vertex's new place on `threads` threads and writes the record.
+    /// Surveys the source, and computes every vertex's new place on `threads` threads.
     pub fn new(request: &Request, source: Source, threads: usize) -> Result<Self> {
         let options = &request.options;
         check_record_is_no_source(options, &source.files)?;
@@ -102,22 +128,49 @@ impl Marking {
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map()?;
         let message = request.subject.message(&request.key);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| Error::Threads(error.to_string()))?;
-        let marked =
-            pool.install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
-        if let Some(path) = &options.record_path {
-            record_file::write(Path::new(path), &record(request, &map, &marked).to_json())?;
-        }
+        let marked = pool(threads)?
+            .install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
+        let record = record(request, &map, &marked).to_json();
         let warnings = warnings(&options.parameters, &message, &map, &marked);
         Ok(Marking {
             name: source.name,
-            table: map.vertices,
+            map,
             moved: marked.coords,
+            record,
             layers: options.layers.clone(),
             files: source.files,
             warnings,
         })
+    }
+
+    /// Writes the record where the request wants it.
+    pub fn write_record(&self, request: &Request) -> Result<()> {
+        let path = request.record_path();
+        path.map_or(Ok(()), |path| record_file::write(path, &self.record))
+    }
+
+    /// Fails unless the message can be demodulated from where the vertices were found: their new places as
+    /// somebody read them, in canonical order.
+    pub fn check_message(&self, request: &Request, found: &[[f64; 2]], threads: usize) -> Result<()> {
+        let parameters = &request.options.parameters;
+        let message = request.subject.message(&request.key);
+        let map = self.map.map()?;
+        let pairs = map.vertices.coords().iter().zip(found);
+        let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();
+        let demodulated = pool(threads)?.install(|| {
+            let patches = Patches::new(&map, parameters)?;
+            let carrier = Carrier::new(&request.key);
+            demodulation::paper(&patches, &carrier, &observed, message.len(), parameters, &|_| ())
+        })?;
+        match demodulated.message().errors(&message) {
+            0 => Ok(()),
+            errors => Err(Error::MessageUnreadable { errors, bits: message.len() }),
+        }
+    }
+
+    /// The new places of the vertices, in canonical order, CRS units.
+    pub fn moved(&self) -> &[[f64; 2]] {
+        &self.moved
     }
 
     /// Whether the vertices of this layer move.
@@ -130,7 +183,7 @@ impl Marking {
         let mut count = 0;
         wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
             count += 1;
-            let index = self.table.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
+            let index = self.map.vertices.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
             Ok(self.moved[index])
         })?;
         Ok(count)
@@ -138,7 +191,7 @@ impl Marking {
 
     /// The furthest any vertex moved along x and y, CRS units.
     pub fn reach(&self) -> [f64; 2] {
-        let moves = self.table.coords().iter().zip(&self.moved);
+        let moves = self.map.vertices.coords().iter().zip(&self.moved);
         moves.fold([0.0; 2], |reach: [f64; 2], (from, to)| {
             [0, 1].map(|axis| reach[axis].max((to[axis] - from[axis]).abs()))
         })
@@ -213,7 +266,7 @@ fn warnings(parameters: &Parameters, message: &Message, map: &Survey, marked: &M
 }
 
 fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
-    let Request { options, subject, key } = request;
+    let Request { options, subject, key, .. } = request;
     let parameters = &options.parameters;
     Record {
         meshmark_record: record::VERSION,

@@ -19,6 +19,22 @@ impl Affine {
         [a * x + b * y + c, d * x + e * y + f]
     }
 
+    /// The affine map that gives the points zero mean and unit covariance; the identity when they are on a line.
+    pub fn whitening(points: &[[f64; 2]]) -> Self {
+        let Some(c) = weighted_mean(points, &vec![1.0; points.len()]) else { return Self::IDENTITY };
+        let mean = |f: &dyn Fn(f64, f64) -> f64| {
+            points.iter().map(|p| f(p[0] - c[0], p[1] - c[1])).sum::<f64>() / points.len() as f64
+        };
+        let (xx, xy, yy) = (mean(&|x, _| x * x), mean(&|x, y| x * y), mean(&|_, y| y * y));
+        let (x_scale, slope) = (xx.sqrt(), xy / xx);
+        let y_scale = (yy - slope * xy).sqrt();
+        if !(x_scale > 0.0 && y_scale > 1e-6 * (yy.sqrt())) {
+            return Self::IDENTITY;
+        }
+        let [a, d, e] = [1.0 / x_scale, -slope / y_scale, 1.0 / y_scale];
+        Affine { coefficients: [a, 0.0, -a * c[0], d, e, -d * c[0] - e * c[1]] }
+    }
+
     /// The affine map that takes `from` to `to` with the least weighted sum of squares; `None` when
     /// the points do not span a plane. `weights` has one entry for every pair.
     pub fn fit(from: &[[f64; 2]], to: &[[f64; 2]], weights: &[f64]) -> Option<Self> {
@@ -57,26 +73,38 @@ impl Affine {
     /// not pull it (paper, section 3.5). Iteratively reweighted least squares (Weiszfeld 1937); distances
     /// below `least_distance` weigh alike. Distances are in the units of `to`.
     pub fn fit_robustly(from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
-        let mut weights = vec![1.0; from.len()];
-        let mut fit = Self::fit(from, to, &weights)?;
-        for _ in 0..50 {
-            for ((w, p), q) in weights.iter_mut().zip(from).zip(to) {
-                let r = fit.apply(*p);
-                *w = 1.0 / (r[0] - q[0]).hypot(r[1] - q[1]).max(least_distance);
-            }
-            let next = Self::fit(from, to, &weights)?;
-            let change = from.iter().map(|p| {
-                let (a, b) = (fit.apply(*p), next.apply(*p));
-                (a[0] - b[0]).hypot(a[1] - b[1])
-            });
-            let settled = change.fold(0.0, f64::max) < 1e-3 * least_distance;
-            fit = next;
-            if settled {
-                break;
-            }
-        }
-        Some(fit)
+        let fit = |weights: &[f64]| Self::fit(from, to, weights);
+        least_distances(from, to, least_distance, fit, |affine, p| affine.apply(p))
     }
+}
+
+/// Iteratively reweighted least squares: `fit` solves with given weights, `apply` maps a point by a solution.
+pub(crate) fn least_distances<T>(
+    from: &[[f64; 2]],
+    to: &[[f64; 2]],
+    least_distance: f64,
+    fit: impl Fn(&[f64]) -> Option<T>,
+    apply: impl Fn(&T, [f64; 2]) -> [f64; 2],
+) -> Option<T> {
+    let mut weights = vec![1.0; from.len()];
+    let mut best = fit(&weights)?;
+    for _ in 0..50 {
+        for ((w, p), q) in weights.iter_mut().zip(from).zip(to) {
+            let r = apply(&best, *p);
+            *w = 1.0 / (r[0] - q[0]).hypot(r[1] - q[1]).max(least_distance);
+        }
+        let next = fit(&weights)?;
+        let change = from.iter().map(|p| {
+            let (a, b) = (apply(&best, *p), apply(&next, *p));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        });
+        let settled = change.fold(0.0, f64::max) < 1e-3 * least_distance;
+        best = next;
+        if settled {
+            break;
+        }
+    }
+    Some(best)
 }
 
 fn weighted_mean(points: &[[f64; 2]], weights: &[f64]) -> Option<[f64; 2]> {

@@ -114,11 +114,12 @@ const NOT_TESTED: [&str; 4] = [
 
 fn found(report: &Report) -> Vec<String> {
     let (v, p) = (&report.vertices, &report.parameters);
-    let mut sentences = vec![format!(
+    let mut sentences = assumed(report);
+    sentences.push(format!(
         "{} of the {} reference vertices have a counterpart within {} m, the suspect being brought onto the reference \
          by {}.",
         v.matched, v.reference, p.radius_m, report.registration.method
-    )];
+    ));
     let Some(message) = &report.message else {
         sentences.push(format!("Nothing was demodulated: {}.", report.reason));
         return sentences;
@@ -130,6 +131,24 @@ fn found(report: &Report) -> Vec<String> {
     sentences.extend(probabilities(report));
     sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
     sentences
+}
+
+/// What was assumed to bring the suspect onto the reference, beyond an affine map.
+fn assumed(report: &Report) -> Vec<String> {
+    let registration = &report.registration;
+    let read_as = registration.read_as.as_ref().map(|read_as| {
+        let why = match report.suspect_crs.iter().all(|crs| crs == "no CRS") {
+            true => "has no CRS",
+            false => "does not lie there under the CRS it claims",
+        };
+        format!("The suspect {why}; its coordinates were read as {read_as}.")
+    });
+    let polynomial = registration.polynomial.map(|_| {
+        "An affine map left a smooth distortion, which a cubic polynomial took away: with it clearly more vertices \
+         match."
+            .into()
+    });
+    read_as.into_iter().chain(polynomial).collect()
 }
 
 fn probabilities(report: &Report) -> Vec<String> {

@@ -7,19 +7,25 @@
 pub mod affine;
 pub mod candidates;
 pub mod compare;
+mod consensus;
+mod crs_search;
+pub mod cubic;
 pub mod decision;
 pub mod decoys;
 mod error;
 pub mod explain;
 mod joined;
+mod landmarks;
 pub mod matching;
 pub mod progress;
 pub mod reading;
 pub mod registration;
 pub mod report;
+mod search;
 mod shapes;
 pub mod survival;
 pub mod verify;
+mod windows;
 
 pub use error::{Error, ExitCode, Result};
 pub use verify::{Demodulator, Request, verify};

@@ -4,7 +4,8 @@ use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{ground::Ground, key::SecretKey, options::Spelling, record::Record};
 use meshmark_dataset::{
-    FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features, survey,
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
+    survey,
 };
 use std::{
     collections::BTreeSet,
@@ -121,8 +122,42 @@ fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> 
     Err(Error::Usage(format!("the reference {path} has no field \"{name}\": --landmark may name {known}")))
 }
 
-/// Reads the suspect in the CRS of the reference, where both are known; and the CRS of its layers.
-pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<(Survey, Vec<String>)> {
+/// A suspect as it was read.
+pub struct Suspect {
+    /// In the CRS of the reference, where both CRS are known and its coordinates make sense in its own.
+    pub map: Survey,
+    /// Whether the numbers of `map` are as they stand in the file.
+    pub is_raw: bool,
+    /// CRS of its layers.
+    pub layer_crs: Vec<String>,
+    /// The first CRS of a layer.
+    pub crs: Option<CoordinateSystem>,
+}
+
+/// Reads the suspect in the CRS of the reference, where both are known; its numbers as they stand when they
+/// cannot be brought there.
+pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
+    let dataset = open_suspect(path)?;
+    let layer_crs = crs_of(&dataset);
+    let crs = dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer);
+    if let (Some(target), Some(_)) = (&reference.crs, &crs) {
+        match survey_of(&dataset, reading, Target::Crs(target)) {
+            Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
+            // PROJ, or the limits of what a map may be: the CRS is not that of the coordinates.
+            Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
+            Err(error) => return Err(failed("suspect", path, error)),
+        }
+    }
+    let map = read("suspect", path, &dataset, reading, Target::Raw)?;
+    Ok(Suspect { map, is_raw: true, layer_crs, crs })
+}
+
+/// Reads the numbers of the suspect as they stand.
+pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
+    read("suspect", path, &open_suspect(path)?, reading, Target::Raw)
+}
+
+fn open_suspect(path: &Path) -> Result<Dataset> {
     if !path.is_file() && !path.is_dir() {
         let path = path.display();
         return Err(Error::Unreadable(format!("the suspect {path} is not a file here: give a local file")));
@@ -131,8 +166,7 @@ pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<(Su
     check_table(path)?;
     let dataset = open("suspect", path, Some(SUSPECT_DRIVERS))?;
     check_plain(path, &dataset)?;
-    let target = reference.crs.as_ref().map_or(Target::Raw, Target::Crs);
-    Ok((read("suspect", path, &dataset, reading, target)?, crs_of(&dataset)))
+    Ok(dataset)
 }
 
 /// A suspect may name addresses: as the CRS of a GeoJSON file, as the schema of a GML file. Nobody shall learn
@@ -227,7 +261,7 @@ fn is_plain(sql: &str) -> bool {
 
 fn crs_of(dataset: &Dataset) -> Vec<String> {
     let label = |layer: gdal::vector::Layer| {
-        let crs = layer.spatial_ref().map(|crs| meshmark_dataset::CoordinateSystem::new(crs).label());
+        let crs = layer.spatial_ref().and_then(CoordinateSystem::of_layer).map(|crs| crs.label());
         crs.unwrap_or_else(|| "no CRS".into())
     };
     dataset.layers().map(label).collect::<BTreeSet<_>>().into_iter().collect()
@@ -249,6 +283,10 @@ fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dat
 }
 
 fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: Target) -> Result<Survey> {
+    survey_of(dataset, reading, target).map_err(|error| failed(what, path, error))
+}
+
+fn survey_of(dataset: &Dataset, reading: &Reading, target: Target) -> meshmark_dataset::Result<Survey> {
     *last_failure() = None;
     let selection = Selection {
         layers: reading.layers,
@@ -258,14 +296,16 @@ fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: T
         most_vertices: MOST_VERTICES,
         last_failure: &|| last_failure().clone(),
     };
-    survey(dataset, &selection).map_err(|error| {
-        let text = format!("the {what} {}: {}", path.display(), error.text(Spelling::Flag));
-        match error {
-            meshmark_dataset::Error::TooLarge { .. } => Error::TooLarge(text),
-            meshmark_dataset::Error::UnknownLayer { .. }
-            | meshmark_dataset::Error::UnknownSrs(_)
-            | meshmark_dataset::Error::ContradictingSrs { .. } => Error::Usage(text),
-            _ => Error::Unreadable(text),
-        }
-    })
+    survey(dataset, &selection)
+}
+
+fn failed(what: &str, path: &Path, error: meshmark_dataset::Error) -> Error {
+    let text = format!("the {what} {}: {}", path.display(), error.text(Spelling::Flag));
+    match error {
+        meshmark_dataset::Error::TooLarge { .. } => Error::TooLarge(text),
+        meshmark_dataset::Error::UnknownLayer { .. }
+        | meshmark_dataset::Error::UnknownSrs(_)
+        | meshmark_dataset::Error::ContradictingSrs { .. } => Error::Usage(text),
+        _ => Error::Unreadable(text),
+    }
 }

@@ -178,12 +178,7 @@ impl Report {
             "vertices:     {} of {} reference vertices found among {} of the suspect",
             v.matched, v.reference, v.suspect
         ));
-        let landmarks = match self.registration.landmarks {
-            0 => String::new(),
-            count => format!(", {count} landmarks"),
-        };
-        let rms = self.registration.rms_m.map_or(String::new(), |rms| format!(", residual {rms:.3} m RMS"));
-        lines.push(format!("registration: {}{landmarks}{rms}", self.registration.method));
+        lines.push(format!("registration: {}", self.registration.to_text()));
         lines.join("\n") + "\n"
     }
 

@@ -2,18 +2,19 @@
 
 use crate::{
     Error, Result,
+    crs_search::{self, Registered, side},
     decision::{Decision, decide},
     decoys::Decoys,
     joined::Graph,
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
-    registration::{LEAST_MATCHED, Registration, Side, Start, register},
+    registration::{LEAST_MATCHED, OUT_OF_PLACE, Registrar, Registration, Start, TIMES_CHANCE},
     report::{Report, VertexCounts},
 };
 use meshmark_core::{
     carrier::Carrier,
-    deformation::{Deformation, Prediction},
+    deformation::{Deformation, Observed, Prediction, mark_deviation_m},
     demodulation::{self, Demodulation},
     ground::Ground,
     key::SecretKey,
@@ -132,7 +133,8 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     let ground = map.ground;
     progress.start("reading", 0);
     let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All };
-    let (suspect, suspect_crs) = reading::suspect(&request.suspect, &plain, reference)?;
+    let suspect = reading::suspect(&request.suspect, &plain, reference)?;
+    let suspect_crs = suspect.layer_crs.clone();
 
     progress.start("patches", 0);
     let patches = Patches::new(&map, &request.parameters);
@@ -142,7 +144,10 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
 
     progress.start("registration", 0);
     let (radius_m, start) = (request.radius_m, request.registration);
-    let registration = register(side(reference), side(&suspect), &ground, radius_m, start);
+    let registrar = Registrar::new(side(reference), &ground, radius_m);
+    let file = (request.suspect.as_path(), &plain);
+    let Registered { map: suspect, registration } =
+        crs_search::register(&registrar, reference, suspect, file, start)?;
 
     progress.start("matching", 0);
     let moved = registration.apply(suspect.vertices.coords());
@@ -161,10 +166,10 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         reference_digest: reference.vertices.digest(),
         crs: reference.crs.as_ref().map(|crs| crs.label()),
         suspect_crs,
-        found: Err(unregistered(&vertices, chance)),
+        found: Err(unregistered(&vertices, chance, start)),
         decoys: None,
     };
-    if matches.count >= LEAST_MATCHED && matches.count >= 2 * chance {
+    if matches.count >= LEAST_MATCHED && matches.count >= TIMES_CHANCE * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
         let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
         let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress);
@@ -184,13 +189,22 @@ fn of_reference(request: &Request, error: impl Into<meshmark_dataset::Error>) ->
     ))
 }
 
-fn unregistered(vertices: &VertexCounts, chance: usize) -> String {
+fn unregistered(vertices: &VertexCounts, chance: usize, start: Start) -> String {
     if vertices.suspect == 0 {
         return "the suspect has no vertices, so there is nothing to compare".into();
     }
+    let remedy = match start {
+        Start::Auto => "",
+        Start::Landmarks => "; only landmarks were tried, --registration auto tries all that is known",
+        Start::Geometry => {
+            "; only geometry was tried, for which too few features may have a shape of their own: --registration auto \
+             tries landmarks too"
+        }
+        Start::None => "; it was taken as it stands, --registration auto looks for its place",
+    };
     format!(
         "only {} of {} reference vertices match, where {LEAST_MATCHED} are needed and {chance} match by chance: the suspect is \
-         too small a piece, another map, or could not be brought onto the reference",
+         too small a piece, another map, or could not be brought onto the reference{remedy}",
         vertices.matched, vertices.reference
     )
 }
@@ -216,10 +230,6 @@ fn demodulate(
     vertices.matched = observed.iter().flatten().count();
     progress.start("demodulation", steps);
     demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &progress.stepper())
-}
-
-fn side(survey: &Survey) -> Side<'_> {
-    Side { vertices: &survey.vertices, labels: &survey.labels, shapes: &survey.shapes }
 }
 
 /// The record must be of this key, and its message what key and recipient give.
@@ -268,7 +278,7 @@ fn by_chance(
     radius_m: f64,
 ) -> usize {
     let unit = ground.metres_per_unit(centre);
-    let shift = [7.3 * radius_m / unit[0].max(f64::MIN_POSITIVE), -5.1 * radius_m / unit[1]];
+    let shift = [0, 1].map(|axis| OUT_OF_PLACE[axis] * radius_m / unit[axis].max(f64::MIN_POSITIVE));
     let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + shift[0], p[1] + shift[1]]).collect();
     matcher.all(&shifted, radius_m).count
 }
@@ -295,12 +305,21 @@ impl Tracking<'_> {
     ) -> meshmark_core::Result<(Vec<Option<[f64; 2]>>, Prediction)> {
         let coords = self.reference.vertices.coords();
         let mut observed = self.displacements(&self.match_joined(coords, request.radius_m));
+        let amplitude_m = request.parameters.amplitude_m;
+        let mark_m = mark_deviation_m(self.patches, carriers, amplitude_m);
+        let fit = |observed: &Observed| {
+            let deformation = Deformation::estimate(self.patches, observed, carriers, &request.parameters)?;
+            Ok(deformation.predict(self.patches, observed, carriers, amplitude_m))
+        };
         let mut round = 1;
         loop {
-            let deformation = Deformation::estimate(self.patches, &observed, carriers, &request.parameters)?;
-            let amplitude_m = request.parameters.amplitude_m;
-            let prediction = deformation.predict(self.patches, &observed, carriers, amplitude_m);
-            if deformation.deviation_m == 0.0 || round == ROUNDS {
+            let mut prediction = fit(&observed)?;
+            if prediction.deformation.deviation_m == 0.0 || round == ROUNDS {
+                let kept = prediction.without_outliers(&observed, mark_m);
+                if kept != observed {
+                    prediction = fit(&kept)?;
+                    observed = kept;
+                }
                 return Ok(prediction.shape_noise(self.patches, &observed, carriers, amplitude_m));
             }
             observed = self.displacements(&self.match_around(&prediction, request.radius_m));

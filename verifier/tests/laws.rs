@@ -18,7 +18,7 @@ use meshmark_verifier::{
     affine::Affine,
     decision::{Decision, Verdict, decide, decide_among},
     matching::Matcher,
-    registration::{Side, Start, register},
+    registration::{Registrar, Side, Start},
 };
 use proptest::prelude::*;
 
@@ -81,13 +81,10 @@ impl Case {
     /// the reference, under a key.
     fn demodulate(&self, moved: &[[f64; 2]], key: &SecretKey) -> Demodulation {
         let suspect = VertexTable::new(moved.to_vec()).unwrap();
-        let found = register(
-            Side { vertices: &self.reference, labels: &self.labels(self.reference.coords()), shapes: &[] },
-            Side { vertices: &suspect, labels: &self.labels(moved), shapes: &[] },
-            &self.ground,
-            1.0,
-            Start::Auto,
-        );
+        let (ours, theirs) = (self.labels(self.reference.coords()), self.labels(moved));
+        let reference = Side { vertices: &self.reference, labels: &ours, shapes: &[] };
+        let found = Registrar::new(reference, &self.ground, 1.0)
+            .register(Side { vertices: &suspect, labels: &theirs, shapes: &[] }, Start::Auto);
         let coords = found.apply(suspect.coords());
         let centre = self.reference.centre();
         let matches = Matcher::new(self.reference.coords(), &self.ground, centre).all(&coords, 1.0);

@@ -296,6 +296,16 @@ fn wrong_reports_are_refused() {
         ("/decoys/standard_deviation", json!(-1)),
         ("/registration/affine", json!([1, 0, 0, 0, 1])),
         ("/registration/rms_m", json!(-0.1)),
+        ("/registration/read_as", json!({ "crs": "EPSG:3857" })),
+        ("/registration/read_as", json!({ "crs": "", "axes_swapped": false })),
+        (
+            "/registration/polynomial",
+            json!({ "centre": [0, 0], "scale": 1, "x": vec![0; 9], "y": vec![0; 10] }),
+        ),
+        (
+            "/registration/polynomial",
+            json!({ "centre": [0, 0], "scale": 0, "x": vec![0; 10], "y": vec![0; 10] }),
+        ),
         ("/vertices/matched", json!(1.5)),
         ("/parameters/demodulator", json!("best")),
         ("/parameters/significance", json!(1)),

@@ -262,7 +262,7 @@ impl Lab<'_> {
                 precision: PRECISION_M,
             }),
         };
-        self.product.verify(&question.key, &question.reference, asked, demodulator, suspect)
+        self.product.verify(&question.key, &question.reference, asked, demodulator, "auto", suspect)
     }
 }
 

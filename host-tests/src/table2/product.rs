@@ -4,6 +4,7 @@ use super::Result;
 use meshmark_core::key::SecretKey;
 use serde::{Deserialize, Serialize};
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
@@ -74,6 +75,7 @@ pub struct Report {
     pub p_recipient_log10: Option<f64>,
     pub registration: Registration,
     pub vertices: Vertices,
+    pub seconds: BTreeMap<String, f64>,
 }
 
 /// How the suspect was brought onto the reference.
@@ -81,6 +83,7 @@ pub struct Report {
 #[allow(missing_docs)]
 pub struct Registration {
     pub method: String,
+    pub affine: [f64; 6],
     pub landmarks: usize,
     pub rms_m: Option<f64>,
 }
@@ -174,10 +177,12 @@ impl Product {
         reference: &Path,
         asked: Asked,
         demodulator: &str,
+        registration: &str,
         suspect: &Path,
     ) -> Result<Report> {
         let mut command = Command::new(&self.meshmark);
         command.env("RAYON_NUM_THREADS", "1").args(["verify", "--json", "--demodulator", demodulator]);
+        command.args(["--registration", registration]);
         command.arg("--key").arg(key).arg("--reference").arg(reference);
         match asked {
             Asked::Record(record) => command.arg("--record").arg(record),

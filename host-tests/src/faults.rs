@@ -1,0 +1,205 @@
+//! Faults while a marked map is written, and what must hold afterwards.
+
+use crate::plugin::{Host, Run};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/faults/fault.c");
+
+/// What goes wrong. Calls are those that change files.
+#[derive(Debug, Clone, Copy)]
+pub enum Fault {
+    /// The process is killed at the n-th call.
+    Kill(usize),
+    /// The process is killed after so many seconds.
+    KillAfter(f64),
+    /// The disk is full from the n-th call on.
+    FullDisk(usize),
+    /// No file can be larger than so many bytes.
+    FileSize(usize),
+}
+
+/// A host in which writing can be made to fail, with a small map, and perhaps a target that is there already.
+pub struct Scene {
+    /// The host.
+    pub host: Host,
+    preload: PathBuf,
+    target: String,
+    options: Vec<String>,
+    /// What the target was before.
+    before: Option<Vec<u8>>,
+}
+
+/// How a scene ended.
+#[derive(Debug, PartialEq, Clone, Copy)]
+pub enum Outcome {
+    /// The complete output is there.
+    Complete,
+    /// Everything is as it was.
+    Previous,
+}
+
+impl Scene {
+    /// Prepares a scene; with `replaces` there is a target, and OVERWRITE=YES.
+    ///
+    /// # Panics
+    /// When the C compiler fails.
+    pub fn new(target: &str, replaces: bool) -> Self {
+        let host = Host::new();
+        fs::write(host.path("in.geojson"), points(400, "")).unwrap();
+        let preload = host.plugins().join("fault.so");
+        compile(&preload);
+        let mut options: Vec<String> = [
+            "-dsco",
+            "PATCH_SIZE=130",
+            "-dsco",
+            "MESSAGE=0123456789abcdef0123456789abcdef",
+            "-dsco",
+            "CHIP_RATE=1",
+        ]
+        .map(String::from)
+        .into();
+        let before = replaces.then(|| {
+            let format = if target.ends_with(".shp") { "ESRI Shapefile" } else { "GPKG" };
+            host.run("ogr2ogr", &["-f", format, target, "in.geojson", "-nln", "before"]).succeeds();
+            fs::read(host.path(target)).unwrap()
+        });
+        if replaces {
+            options.extend(["-dsco".to_string(), "OVERWRITE=YES".into()]);
+        }
+        Scene { host, preload, target: target.into(), options, before }
+    }
+
+    /// Writes the map, with a fault.
+    pub fn write(&self, fault: Option<Fault>) -> Run {
+        let options: Vec<&str> = self.options.iter().map(String::as_str).collect();
+        let arguments = Host::create_arguments(&self.target, "in.geojson", &options);
+        let (kind, at) = match fault {
+            Some(Fault::Kill(at)) => ("kill", at.to_string()),
+            Some(Fault::FullDisk(at)) => ("full", at.to_string()),
+            _ => ("none", String::new()),
+        };
+        let before: Vec<String> = match fault {
+            Some(Fault::KillAfter(seconds)) => {
+                vec!["timeout".into(), "-s".into(), "KILL".into(), seconds.to_string()]
+            }
+            Some(Fault::FileSize(bytes)) => vec!["sh".into(), "-c".into(), limited(bytes), "sh".into()],
+            _ => Vec::new(),
+        };
+        let line: Vec<&str> = before
+            .iter()
+            .map(String::as_str)
+            .chain(["ogr2ogr"])
+            .chain(arguments.iter().map(String::as_str))
+            .collect();
+        let (preload, log) = (self.preload.display().to_string(), self.log().display().to_string());
+        let variables =
+            [("LD_PRELOAD", preload.as_str()), ("FAULT", kind), ("FAULT_AT", &at), ("FAULT_LOG", &log)];
+        // Shells and timers shall not fail, only the host.
+        let variables = if before.is_empty() { &variables[..] } else { &[] };
+        self.host.run_with(line[0], &line[1..], variables)
+    }
+
+    fn log(&self) -> PathBuf {
+        self.host.plugins().join("calls")
+    }
+
+    /// How many calls change files when nothing fails.
+    pub fn count_calls(&self) -> usize {
+        self.write(None).succeeds();
+        fs::read_to_string(self.log()).unwrap().trim().parse().unwrap()
+    }
+
+    /// Asserts that the output is complete or as it was, and says which.
+    #[track_caller]
+    pub fn outcome(&self, context: &str) -> Outcome {
+        let now = fs::read(self.host.path(&self.target)).ok();
+        if now == self.before {
+            return Outcome::Previous;
+        }
+        assert!(now.is_some(), "{context}: what was there is lost");
+        let (run, report) = self.host.verify("ref.gpkg", &["--record", "record.json", &self.target]);
+        assert_eq!((run.code, &report["bit_errors"]), (Some(0), &0.into()), "{context}: {}", run.stderr);
+        Outcome::Complete
+    }
+
+    /// Writes with a fault and asserts all that must hold; how it ended.
+    #[track_caller]
+    pub fn survives(&self, fault: Fault) -> Outcome {
+        let run = self.write(Some(fault));
+        let context = format!("{fault:?}: {:?} {}", run.code, run.stderr);
+        let outcome = self.outcome(&context);
+        match fault {
+            Fault::Kill(_) | Fault::KillAfter(_) => self.check_next_run(outcome, &context),
+            Fault::FullDisk(_) | Fault::FileSize(_) => {
+                assert_eq!(run.code == Some(0), outcome == Outcome::Complete, "{context}");
+                self.check_no_leftovers(outcome, &context);
+            }
+        }
+        outcome
+    }
+
+    /// The same command again removes what a killed one left, and does its work where that is still to be done.
+    #[track_caller]
+    fn check_next_run(&self, outcome: Outcome, context: &str) {
+        let next = self.write(None);
+        let done_before = outcome == Outcome::Complete; // then the reference is in the way of another
+        assert_eq!(next.code == Some(0), !done_before, "{context}\nnext: {}", next.stderr);
+        assert_eq!(self.outcome(context), Outcome::Complete);
+        self.check_no_leftovers(Outcome::Complete, context);
+    }
+
+    #[track_caller]
+    fn check_no_leftovers(&self, outcome: Outcome, context: &str) {
+        let is_part = |name: &String| {
+            let stem = Path::new(&self.target).file_stem().unwrap().to_str().unwrap();
+            name.starts_with(stem) || ["ref.gpkg", "record.json"].contains(&name.as_str())
+        };
+        let (parts, others): (Vec<_>, Vec<_>) = self.host.names().into_iter().partition(is_part);
+        assert_eq!(others, ["in.geojson", "key.json"], "{context}");
+        let companions = parts.iter().filter(|name| !name.starts_with("out")).count();
+        assert_eq!(companions, if outcome == Outcome::Complete { 2 } else { 0 }, "{context}: {parts:?}");
+    }
+
+    /// Back to where it began.
+    pub fn reset(&self) {
+        for name in self.host.names() {
+            let path = self.host.path(&name);
+            match name.as_str() {
+                "in.geojson" | "key.json" => {}
+                _ if path.is_dir() => fs::remove_dir_all(path).unwrap(),
+                _ => fs::remove_file(path).unwrap(),
+            }
+        }
+        if let Some(before) = &self.before {
+            fs::write(self.host.path(&self.target), before).unwrap();
+        }
+    }
+}
+
+/// A GeoJSON map of points in degrees; `#` in the properties is the number of each.
+pub fn points(count: usize, properties: &str) -> String {
+    let feature = |i: usize| {
+        let (x, y) = (25.0 + (i % 20) as f64 * 0.001 + i as f64 * 1e-5, 60.0 + (i / 20) as f64 * 0.001);
+        let properties = properties.replace('#', &i.to_string());
+        format!(
+            r#"{{"type":"Feature","properties":{{{properties}}},"geometry":{{"type":"Point","coordinates":[{x},{y}]}}}}"#,
+        )
+    };
+    let features: Vec<String> = (0..count).map(feature).collect();
+    format!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, features.join(","))
+}
+
+/// A shell script that runs its arguments with a limit on the size of files, as an error instead of a signal.
+fn limited(bytes: usize) -> String {
+    format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", bytes / 512) // POSIX: units of 512 bytes
+}
+
+fn compile(library: &Path) {
+    let arguments = ["-O1", "-shared", "-fPIC", SOURCE, "-ldl", "-o"];
+    let output = Command::new("cc").args(arguments).arg(library).output().expect("cc can be run");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}

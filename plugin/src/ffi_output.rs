@@ -1,0 +1,566 @@
+//! Datasets that are written, by GDAL's C API: layers, fields, features, and what describes them.
+
+use crate::{
+    error::{Error, Result},
+    ffi_errors::Collector,
+    ffi_source::{strings, text},
+};
+use gdal_sys::{
+    GDALDatasetH, OGRErr, OGRFeatureH, OGRFieldDefnH, OGRFieldSubType, OGRFieldType, OGRLayerH,
+    OGRSpatialReferenceH, OGRwkbGeometryType,
+};
+use std::{
+    ffi::{CStr, CString, c_char, c_int},
+    marker::PhantomData,
+    mem::ManuallyDrop,
+    path::Path,
+    ptr,
+};
+
+unsafe extern "C" {
+    /// A list field as a JSON array; the caller frees it.
+    fn meshmark_shim_list_as_json(feature: OGRFeatureH, field: c_int) -> *mut c_char;
+}
+
+/// The configuration option for checking creation options.
+const VALIDATE: &CStr = c"GDAL_VALIDATE_CREATION_OPTIONS";
+
+/// What a layer is created with.
+pub struct LayerSpec {
+    /// Its name.
+    pub name: String,
+    /// Of its geometry column.
+    pub geometry: OGRwkbGeometryType::Type,
+    /// Layer creation options.
+    pub options: Vec<(String, String)>,
+    srs: Srs,
+}
+
+impl LayerSpec {
+    /// # Safety
+    /// `srs` is null or a spatial reference.
+    pub unsafe fn new(
+        name: String,
+        srs: OGRSpatialReferenceH,
+        geometry: OGRwkbGeometryType::Type,
+        options: Vec<(String, String)>,
+    ) -> Self {
+        // SAFETY: as the caller promises.
+        let srs = Srs(if srs.is_null() { srs } else { unsafe { gdal_sys::OSRClone(srs) } });
+        LayerSpec { name, geometry, options, srs }
+    }
+
+    /// The same layer with other options.
+    pub fn with_options(&self, options: Vec<(String, String)>) -> Self {
+        // SAFETY: the spatial reference is null or ours.
+        unsafe { Self::new(self.name.clone(), self.srs.0, self.geometry, options) }
+    }
+}
+
+struct Srs(OGRSpatialReferenceH);
+
+impl Drop for Srs {
+    fn drop(&mut self) {
+        if !self.0.is_null() {
+            // SAFETY: the reference is ours.
+            unsafe { gdal_sys::OSRRelease(self.0) };
+        }
+    }
+}
+
+/// What a field is created with.
+#[derive(Clone)]
+pub struct Field {
+    /// Its name.
+    pub name: String,
+    /// Its type.
+    pub kind: OGRFieldType::Type,
+    subkind: OGRFieldSubType::Type,
+    width: c_int,
+    precision: c_int,
+    nullable: c_int,
+    unique: c_int,
+    default: Option<CString>,
+    domain: Option<CString>,
+    alternative_name: Option<CString>,
+}
+
+impl Field {
+    /// A text field.
+    pub fn text(name: String) -> Self {
+        Field {
+            name,
+            kind: OGRFieldType::OFTString,
+            subkind: OGRFieldSubType::OFSTNone,
+            width: 0,
+            precision: 0,
+            nullable: 1,
+            unique: 0,
+            default: None,
+            domain: None,
+            alternative_name: None,
+        }
+    }
+
+    /// # Safety
+    /// `field` is a field definition.
+    pub unsafe fn read(field: OGRFieldDefnH) -> Self {
+        // SAFETY: the definition is valid, its strings are null or C strings that are copied.
+        unsafe {
+            let string = |s: *const c_char| (!s.is_null() && *s != 0).then(|| CStr::from_ptr(s).to_owned());
+            Field {
+                name: text(gdal_sys::OGR_Fld_GetNameRef(field)),
+                kind: gdal_sys::OGR_Fld_GetType(field),
+                subkind: gdal_sys::OGR_Fld_GetSubType(field),
+                width: gdal_sys::OGR_Fld_GetWidth(field),
+                precision: gdal_sys::OGR_Fld_GetPrecision(field),
+                nullable: gdal_sys::OGR_Fld_IsNullable(field),
+                unique: gdal_sys::OGR_Fld_IsUnique(field),
+                default: string(gdal_sys::OGR_Fld_GetDefault(field)),
+                domain: string(gdal_sys::OGR_Fld_GetDomainName(field)),
+                alternative_name: string(gdal_sys::OGR_Fld_GetAlternativeNameRef(field)),
+            }
+        }
+    }
+
+    /// The field of a staging GeoPackage that keeps every value of this one: what GeoPackage would change
+    /// becomes text. Constraints are the target's to check.
+    pub fn staged(&self, name: String, is_geopackage: bool) -> Self {
+        let kept = match self.kind {
+            OGRFieldType::OFTInteger
+            | OGRFieldType::OFTInteger64
+            | OGRFieldType::OFTReal
+            | OGRFieldType::OFTString
+            | OGRFieldType::OFTBinary
+            | OGRFieldType::OFTDate => true,
+            OGRFieldType::OFTDateTime => is_geopackage,
+            _ => false,
+        };
+        match kept {
+            true => Field {
+                kind: self.kind,
+                subkind: self.subkind,
+                default: self.default.clone(),
+                ..Field::text(name)
+            },
+            false => Field::text(name),
+        }
+    }
+
+    /// Whether it holds several values.
+    pub fn is_list(&self) -> bool {
+        matches!(
+            self.kind,
+            OGRFieldType::OFTIntegerList
+                | OGRFieldType::OFTInteger64List
+                | OGRFieldType::OFTRealList
+                | OGRFieldType::OFTStringList
+        )
+    }
+
+    fn with_handle<T>(&self, f: impl FnOnce(OGRFieldDefnH) -> T) -> T {
+        let name = c_string(&self.name);
+        // SAFETY: the definition is made, used and destroyed here; its strings are copied.
+        unsafe {
+            let field = gdal_sys::OGR_Fld_Create(name.as_ptr(), self.kind);
+            gdal_sys::OGR_Fld_SetSubType(field, self.subkind);
+            gdal_sys::OGR_Fld_SetWidth(field, self.width);
+            gdal_sys::OGR_Fld_SetPrecision(field, self.precision);
+            gdal_sys::OGR_Fld_SetNullable(field, self.nullable);
+            gdal_sys::OGR_Fld_SetUnique(field, self.unique);
+            if let Some(text) = &self.default {
+                gdal_sys::OGR_Fld_SetDefault(field, text.as_ptr());
+            }
+            if let Some(text) = &self.domain {
+                gdal_sys::OGR_Fld_SetDomainName(field, text.as_ptr());
+            }
+            if let Some(text) = &self.alternative_name {
+                gdal_sys::OGR_Fld_SetAlternativeName(field, text.as_ptr());
+            }
+            let result = f(field);
+            gdal_sys::OGR_Fld_Destroy(field);
+            result
+        }
+    }
+}
+
+/// A dataset that is written.
+pub struct Output {
+    dataset: GDALDatasetH,
+    layers: Vec<OGRLayerH>,
+}
+
+impl Output {
+    /// Creates a dataset by the driver of this name.
+    pub fn create(driver: &str, path: &Path) -> Result<Self> {
+        let collector = Collector::new();
+        let path_text = c_string(&path.display().to_string());
+        // SAFETY: the names are C strings, a null list means no options, zero bands mean vectors.
+        let dataset = unsafe {
+            let handle = gdal_sys::GDALGetDriverByName(c_string(driver).as_ptr());
+            if handle.is_null() {
+                return Err(failure(format!("finding GDAL's driver {driver}"), &collector));
+            }
+            gdal_sys::GDALCreate(
+                handle,
+                path_text.as_ptr(),
+                0,
+                0,
+                0,
+                gdal_sys::GDALDataType::GDT_Unknown,
+                ptr::null_mut(),
+            )
+        };
+        match dataset.is_null() {
+            true => Err(failure(format!("creating a {driver} dataset"), &collector)),
+            false => Ok(Output { dataset, layers: Vec::new() }),
+        }
+    }
+
+    /// The dataset, which lives as long as this.
+    pub fn handle(&self) -> GDALDatasetH {
+        self.dataset
+    }
+
+    /// A layer, which lives as long as this.
+    pub fn layer(&self, number: usize) -> OGRLayerH {
+        self.layers[number]
+    }
+
+    /// Begins the one transaction of a database.
+    pub fn begin(&self) -> Result<()> {
+        let collector = Collector::new();
+        // SAFETY: the dataset is open.
+        let error = unsafe { gdal_sys::GDALDatasetStartTransaction(self.dataset, 0) };
+        check(error, || "starting a transaction".into(), &collector)
+    }
+
+    /// Commits it.
+    pub fn commit(&self) -> Result<()> {
+        let collector = Collector::new();
+        // SAFETY: the dataset is open.
+        let error = unsafe { gdal_sys::GDALDatasetCommitTransaction(self.dataset) };
+        check(error, || "committing".into(), &collector)
+    }
+
+    /// Creates a layer. What the driver has to say is emitted unless `quiet`.
+    pub fn add_layer(&mut self, spec: &LayerSpec, quiet: bool) -> Result<()> {
+        let name = c_string(&spec.name);
+        let options: Vec<CString> = spec.options.iter().map(|(n, v)| c_string(&format!("{n}={v}"))).collect();
+        let mut list: Vec<*mut c_char> = options.iter().map(|o| o.as_ptr().cast_mut()).collect();
+        list.push(ptr::null_mut());
+        let collector = Collector::new();
+        // SAFETY: the dataset is open, the list ends in null, and GDAL changes no option; the configuration option
+        // is restored. GDAL has checked the options already when the host created the layer.
+        let layer = unsafe {
+            let before = gdal_sys::CPLGetThreadLocalConfigOption(VALIDATE.as_ptr(), ptr::null());
+            let before = (!before.is_null()).then(|| CStr::from_ptr(before).to_owned());
+            gdal_sys::CPLSetThreadLocalConfigOption(VALIDATE.as_ptr(), c"NO".as_ptr());
+            let layer = gdal_sys::GDALDatasetCreateLayer(
+                self.dataset,
+                name.as_ptr(),
+                spec.srs.0,
+                spec.geometry,
+                list.as_mut_ptr(),
+            );
+            let before = before.as_ref().map_or(ptr::null(), |value| value.as_ptr());
+            gdal_sys::CPLSetThreadLocalConfigOption(VALIDATE.as_ptr(), before);
+            layer
+        };
+        if layer.is_null() {
+            return Err(failure(format!("creating layer \"{}\"", spec.name), &collector));
+        }
+        self.layers.push(layer);
+        if !quiet {
+            collector.release();
+        }
+        Ok(())
+    }
+
+    /// The fields of a layer.
+    pub fn fields(&self, layer: usize) -> Vec<Field> {
+        // SAFETY: the definition lives as long as the layer, and the indices are those of its fields.
+        unsafe {
+            let definition = gdal_sys::OGR_L_GetLayerDefn(self.layers[layer]);
+            let count = gdal_sys::OGR_FD_GetFieldCount(definition);
+            (0..count).map(|i| Field::read(gdal_sys::OGR_FD_GetFieldDefn(definition, i))).collect()
+        }
+    }
+
+    /// How many fields a layer has.
+    pub fn field_count(&self, layer: usize) -> usize {
+        // SAFETY: the definition lives as long as the layer.
+        unsafe { gdal_sys::OGR_FD_GetFieldCount(gdal_sys::OGR_L_GetLayerDefn(self.layers[layer])) as usize }
+    }
+
+    /// The name of a layer, and of its columns for ids and geometries; empty where there is none.
+    pub fn names(&self, layer: usize) -> [String; 3] {
+        // SAFETY: the layer is open and the names are C strings.
+        unsafe {
+            let layer = self.layers[layer];
+            [
+                text(gdal_sys::OGR_L_GetName(layer)),
+                text(gdal_sys::OGR_L_GetFIDColumn(layer)),
+                text(gdal_sys::OGR_L_GetGeometryColumn(layer)),
+            ]
+        }
+    }
+
+    /// Creates a field.
+    pub fn add_field(&self, layer: usize, field: &Field, approximate: bool, quiet: bool) -> Result<()> {
+        let collector = Collector::new();
+        // SAFETY: the layer is open.
+        let error = field.with_handle(|handle| unsafe {
+            gdal_sys::OGR_L_CreateField(self.layers[layer], handle, c_int::from(approximate))
+        });
+        check(error, || format!("creating field \"{}\"", field.name), &collector)?;
+        if !quiet {
+            collector.release();
+        }
+        Ok(())
+    }
+
+    /// A new feature of a layer.
+    pub fn feature(&self, layer: usize) -> Feature {
+        // SAFETY: the definition outlives the feature: GDAL counts references to it.
+        Feature(unsafe { gdal_sys::OGR_F_Create(gdal_sys::OGR_L_GetLayerDefn(self.layers[layer])) })
+    }
+
+    /// Writes a feature; its id.
+    pub fn write(&self, layer: usize, feature: &Feature, quiet: bool) -> Result<i64> {
+        let collector = Collector::new();
+        // SAFETY: the layer and the feature are open.
+        let error = unsafe { gdal_sys::OGR_L_CreateFeature(self.layers[layer], feature.0) };
+        check(error, || "writing it".into(), &collector)?;
+        if !quiet {
+            collector.release();
+        }
+        // SAFETY: the feature is ours.
+        Ok(unsafe { gdal_sys::OGR_F_GetFID(feature.0) })
+    }
+
+    /// Takes the field domains of another dataset.
+    pub fn copy_domains(&self, from: &Output) {
+        // SAFETY: both datasets are open; the list and the reason are ours to free.
+        unsafe {
+            let names = gdal_sys::GDALDatasetGetFieldDomainNames(from.dataset, ptr::null_mut());
+            for name in strings(names.cast()) {
+                let domain = gdal_sys::GDALDatasetGetFieldDomain(from.dataset, c_string(&name).as_ptr());
+                let mut reason = ptr::null_mut();
+                if !domain.is_null() {
+                    gdal_sys::GDALDatasetAddFieldDomain(self.dataset, domain, &mut reason);
+                    gdal_sys::VSIFree(reason.cast());
+                }
+            }
+            gdal_sys::CSLDestroy(names);
+        }
+    }
+
+    /// Takes metadata and styles of the dataset that a host described.
+    pub fn describe(&self, described: &Described) {
+        // SAFETY: both datasets are open, and the style table is copied.
+        unsafe {
+            copy_metadata(described.0.cast(), self.dataset.cast());
+            let styles = gdal_sys::GDALDatasetGetStyleTable(described.0);
+            if !styles.is_null() {
+                gdal_sys::GDALDatasetSetStyleTable(self.dataset, styles);
+            }
+        }
+    }
+
+    /// The same for a layer.
+    pub fn describe_layer(&self, layer: usize, described: &Described) {
+        // SAFETY: GDAL checks the index; both layers are open, and the style table is copied.
+        unsafe {
+            let described = gdal_sys::GDALDatasetGetLayer(described.0, layer as c_int);
+            if described.is_null() {
+                return;
+            }
+            copy_metadata(described.cast(), self.layers[layer].cast());
+            let styles = gdal_sys::OGR_L_GetStyleTable(described);
+            if !styles.is_null() {
+                gdal_sys::OGR_L_SetStyleTable(self.layers[layer], styles);
+            }
+        }
+    }
+
+    /// Closes the dataset; many drivers write only now.
+    pub fn close(self) -> Result<()> {
+        let collector = Collector::new();
+        let dataset = ManuallyDrop::new(self).dataset;
+        // SAFETY: the dataset is open and ours.
+        unsafe { gdal_sys::GDALClose(dataset) };
+        match collector.first_failure() {
+            None => Ok(()),
+            Some(_) => Err(failure("closing".into(), &collector)),
+        }
+    }
+}
+
+/// Gives it up: what its driver has to say about that concerns nobody.
+impl Drop for Output {
+    fn drop(&mut self) {
+        let _quiet = Collector::new();
+        // SAFETY: the dataset is open and ours.
+        unsafe { gdal_sys::GDALClose(self.dataset) };
+    }
+}
+
+/// # Safety
+/// Both are datasets or layers that are open.
+unsafe fn copy_metadata(from: *mut std::ffi::c_void, to: *mut std::ffi::c_void) {
+    // SAFETY: the list of names is ours to free, those of a domain are copied.
+    unsafe {
+        let domains = gdal_sys::GDALGetMetadataDomainList(from);
+        for domain in strings(domains.cast()) {
+            let domain = c_string(&domain);
+            let items = gdal_sys::GDALGetMetadata(from, domain.as_ptr());
+            if !items.is_null() && !(*items).is_null() {
+                gdal_sys::GDALSetMetadata(to, items.cast(), domain.as_ptr());
+            }
+        }
+        gdal_sys::CSLDestroy(domains);
+    }
+}
+
+/// The dataset that a host writes to, with the metadata and styles it set.
+pub struct Described(GDALDatasetH);
+
+impl Described {
+    /// # Safety
+    /// The dataset stays open while this lives.
+    pub unsafe fn new(dataset: GDALDatasetH) -> Self {
+        Described(dataset)
+    }
+}
+
+/// A feature of somebody else.
+#[derive(Clone, Copy)]
+pub struct FeatureRef<'a>(OGRFeatureH, PhantomData<&'a ()>);
+
+impl FeatureRef<'_> {
+    /// # Safety
+    /// The feature stays while this lives.
+    pub unsafe fn new(feature: OGRFeatureH) -> Self {
+        FeatureRef(feature, PhantomData)
+    }
+
+    /// Its id, when it has one.
+    pub fn id(&self) -> Option<i64> {
+        // SAFETY: the feature is there.
+        Some(unsafe { gdal_sys::OGR_F_GetFID(self.0) }).filter(|&id| id != NULL_ID)
+    }
+
+    /// Gives it the id under which it was written.
+    pub fn set_id(&self, id: i64) {
+        // SAFETY: the feature is there.
+        unsafe { gdal_sys::OGR_F_SetFID(self.0, id) };
+    }
+
+    /// How many fields it has.
+    pub fn field_count(&self) -> usize {
+        // SAFETY: the feature is there.
+        unsafe { gdal_sys::OGR_F_GetFieldCount(self.0) as usize }
+    }
+
+    /// How it shall look, where that is said.
+    pub fn style(&self) -> Option<String> {
+        // SAFETY: the feature is there; the style is null or a C string.
+        Some(unsafe { text(gdal_sys::OGR_F_GetStyleString(self.0)) }).filter(|style| !style.is_empty())
+    }
+
+    /// A text field's value; empty when it has none.
+    pub fn text(&self, field: usize) -> String {
+        // SAFETY: the feature is there, GDAL checks the index, and the value is a C string.
+        unsafe { text(gdal_sys::OGR_F_GetFieldAsString(self.0, field as c_int)) }
+    }
+}
+
+/// GDAL's id of a feature that has none.
+const NULL_ID: i64 = -1;
+
+/// A feature of our own.
+pub struct Feature(OGRFeatureH);
+
+impl Feature {
+    /// # Safety
+    /// The feature is the caller's to destroy.
+    pub unsafe fn from_handle(feature: OGRFeatureH) -> Self {
+        Feature(feature)
+    }
+
+    /// For reading.
+    pub fn borrow(&self) -> FeatureRef<'_> {
+        FeatureRef(self.0, PhantomData)
+    }
+
+    /// Takes geometry and attributes of another feature; `map` has for each of its fields the number of the
+    /// field here, or none; those of `lists` become JSON.
+    pub fn copy_from(&self, other: FeatureRef, map: &[Option<usize>], lists: &[usize]) -> Result<()> {
+        if map.len() != other.field_count() {
+            let reason = format!("it has {} fields, its layer {}", other.field_count(), map.len());
+            return Err(Error::Writing { what: "copying its attributes".into(), reason });
+        }
+        let collector = Collector::new();
+        let to = |(i, to): (usize, &Option<usize>)| match to {
+            Some(to) if !lists.contains(&i) => *to as c_int,
+            _ => -1,
+        };
+        let indices: Vec<c_int> = map.iter().enumerate().map(to).collect();
+        // SAFETY: both features are there, and the map is as long as the fields of the other.
+        let error = unsafe { gdal_sys::OGR_F_SetFromWithMap(self.0, other.0, 0, indices.as_ptr()) };
+        check(error, || "copying its attributes".into(), &collector)?;
+        for &list in lists {
+            let Some(to) = map[list] else { continue };
+            // SAFETY: GDAL checks the indices; the text is ours to free.
+            unsafe {
+                let json = meshmark_shim_list_as_json(other.0, list as c_int);
+                if !json.is_null() {
+                    gdal_sys::OGR_F_SetFieldString(self.0, to as c_int, json);
+                    gdal_sys::VSIFree(json.cast());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets its id.
+    pub fn set_id(&self, id: i64) {
+        self.borrow().set_id(id);
+    }
+
+    /// Sets its style.
+    pub fn set_style(&self, style: &str) {
+        // SAFETY: the feature is ours, and the text is copied.
+        unsafe { gdal_sys::OGR_F_SetStyleString(self.0, c_string(style).as_ptr()) };
+    }
+
+    /// Sets a field to a text.
+    pub fn set_text(&self, field: usize, value: &str) {
+        // SAFETY: the feature is ours, GDAL checks the index, and the text is copied.
+        unsafe { gdal_sys::OGR_F_SetFieldString(self.0, field as c_int, c_string(value).as_ptr()) };
+    }
+}
+
+impl Drop for Feature {
+    fn drop(&mut self) {
+        // SAFETY: the feature is ours.
+        unsafe { gdal_sys::OGR_F_Destroy(self.0) };
+    }
+}
+
+fn c_string(text: &str) -> CString {
+    CString::new(text).expect("it was a C string")
+}
+
+fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
+    match error {
+        OGRErr::OGRERR_NONE => Ok(()),
+        _ => Err(failure(what(), collector)),
+    }
+}
+
+fn failure(what: String, collector: &Collector) -> Error {
+    let reason = collector.first_failure().unwrap_or_else(|| "GDAL gives no reason".into());
+    Error::Writing { what, reason }
+}

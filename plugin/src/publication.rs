@@ -1,0 +1,272 @@
+//! Publication: files made in workplaces appear in their places together, or none does.
+//!
+//! The order is record, reference, side files, main file; so whoever sees the main file finds the others.
+//! New files are linked, not moved, so that a publication that was cut short can be told from one that was
+//! not, and undone: the same file is then in both places. The main file alone may replace another one, by a
+//! single rename. Side files that are in the way are moved into the workplace first, and back when it fails.
+
+use crate::{
+    error::{Error, Result},
+    source_files::same_file,
+    workplace::file_error,
+};
+use std::{
+    ffi::OsStr,
+    fs::{self, File},
+    io::{self, ErrorKind},
+    os::unix::ffi::OsStrExt,
+    path::{Path, PathBuf},
+};
+
+/// The file of a workplace that says what is being published, while it is.
+pub const JOURNAL: &str = "journal";
+
+/// What is to be published.
+#[derive(Debug, Default)]
+pub struct Publication {
+    /// Record, reference, side files: from where in a workplace to which place, where nothing may be.
+    pub companions: Vec<Move>,
+    /// Files of a dataset that is replaced: from their place to where they are kept meanwhile.
+    pub retired: Vec<Move>,
+    /// The main file.
+    pub main: Move,
+    /// Whether the main file may replace another.
+    pub overwrite: bool,
+}
+
+/// From where to where.
+#[derive(Debug, Default, PartialEq, Clone)]
+pub struct Move {
+    /// The path it has.
+    pub from: PathBuf,
+    /// The path it gets.
+    pub to: PathBuf,
+}
+
+impl Publication {
+    /// Publishes all, or leaves everything as it was. `workplace` is that of the main file.
+    pub fn run(&self, workplace: &Path) -> Result<()> {
+        self.sync_content()?;
+        let journal = workplace.join(JOURNAL);
+        write_durably(&journal, &self.to_bytes()).map_err(|e| file_error("writing", &journal, e))?;
+        let done = self.put_in_place();
+        if done.is_err() {
+            self.undo();
+        }
+        done
+    }
+
+    fn put_in_place(&self) -> Result<()> {
+        for Move { from, to } in &self.retired {
+            fs::rename(from, to).map_err(|e| file_error("moving away", from, e))?;
+        }
+        for companion in &self.companions {
+            link(companion)?;
+        }
+        let moves = self.companions.iter().chain([&self.main]);
+        moves.clone().filter(|m| **m != self.main).try_for_each(|m| sync_folder(&m.to))?;
+        match self.overwrite {
+            false => link(&self.main)?,
+            true => fs::rename(&self.main.from, &self.main.to)
+                .map_err(|e| file_error("replacing", &self.main.to, e))?,
+        }
+        // It is there: nothing may fail any more. Should the power fail now, then old and new are both whole.
+        drop(sync_folder(&self.main.to));
+        Ok(())
+    }
+
+    /// Whether the main file is in its place.
+    fn is_done(&self) -> bool {
+        !self.main.from.exists() || same_file(&self.main.from, &self.main.to)
+    }
+
+    fn undo(&self) {
+        for Move { from, to } in &self.companions {
+            if same_file(from, to) {
+                drop(fs::remove_file(to));
+            }
+        }
+        for Move { from, to } in &self.retired {
+            if to.exists() && !from.exists() {
+                drop(fs::rename(to, from));
+            }
+        }
+    }
+
+    /// A power failure after the names are in place must not find them empty.
+    fn sync_content(&self) -> Result<()> {
+        for Move { from, .. } in self.companions.iter().chain([&self.main]) {
+            File::open(from).and_then(|file| file.sync_all()).map_err(|e| file_error("writing", from, e))?;
+        }
+        Ok(())
+    }
+
+    /// Kind, from, to; each ended by NUL, which no path contains.
+    fn to_bytes(&self) -> Vec<u8> {
+        let lists = [
+            ("new", &self.companions[..]),
+            ("old", &self.retired),
+            ("main", std::slice::from_ref(&self.main)),
+        ];
+        let mut bytes = Vec::new();
+        for (kind, moves) in lists {
+            for Move { from, to } in moves {
+                for text in [kind.as_bytes(), from.as_os_str().as_bytes(), to.as_os_str().as_bytes()] {
+                    bytes.extend_from_slice(text);
+                    bytes.push(0);
+                }
+            }
+        }
+        bytes
+    }
+
+    /// None when it was not written to its end: then nothing was published.
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let texts: Vec<&[u8]> = bytes.strip_suffix(&[0])?.split(|&byte| byte == 0).collect();
+        let path = |text: &[u8]| PathBuf::from(OsStr::from_bytes(text));
+        let mut publication = Publication::default();
+        let mut complete = false;
+        for entry in texts.chunks(3) {
+            let &[kind, from, to] = entry else { return None };
+            let entry = Move { from: path(from), to: path(to) };
+            match kind {
+                b"new" => publication.companions.push(entry),
+                b"old" => publication.retired.push(entry),
+                b"main" => (publication.main, complete) = (entry, true),
+                _ => return None,
+            }
+        }
+        complete.then_some(publication)
+    }
+}
+
+/// Undoes what a killed process published without its main file.
+pub fn recover(workplace: &Path) {
+    let publication =
+        fs::read(workplace.join(JOURNAL)).ok().and_then(|bytes| Publication::from_bytes(&bytes));
+    if let Some(publication) = publication.filter(|publication| !publication.is_done()) {
+        publication.undo();
+    }
+}
+
+/// Another name for a file, in a place where nothing is.
+fn link(Move { from, to }: &Move) -> Result<()> {
+    fs::hard_link(from, to).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => {
+            Error::Exists { path: to.display().to_string(), remedy: "move it away, or give another name" }
+        }
+        _ => file_error("making", to, error),
+    })
+}
+
+fn sync_folder(path: &Path) -> Result<()> {
+    let folder = path.parent().unwrap_or(path);
+    File::open(folder).and_then(|folder| folder.sync_all()).map_err(|e| file_error("writing into", folder, e))
+}
+
+fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fs::write(path, bytes)?;
+    File::open(path)?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Scene {
+        folder: tempfile::TempDir,
+        publication: Publication,
+    }
+
+    impl Scene {
+        fn new(overwrite: bool) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let path = |name: &str| folder.path().join(name);
+            for name in ["work", "work/old"] {
+                fs::create_dir(path(name)).unwrap();
+            }
+            for name in ["work/map.shp", "work/map.dbf", "work/ref.gpkg"] {
+                fs::write(path(name), "new").unwrap();
+            }
+            let part = |from: &str, to: &str| Move { from: path(from), to: path(to) };
+            let mut publication = Publication {
+                companions: vec![part("work/ref.gpkg", "ref.gpkg"), part("work/map.dbf", "map.dbf")],
+                retired: Vec::new(),
+                main: part("work/map.shp", "map.shp"),
+                overwrite,
+            };
+            if overwrite {
+                for name in ["map.shp", "map.dbf"] {
+                    fs::write(path(name), "old").unwrap();
+                }
+                publication.retired.push(part("map.dbf", "work/old/map.dbf"));
+            }
+            Scene { folder, publication }
+        }
+
+        fn read(&self, name: &str) -> Option<String> {
+            fs::read_to_string(self.folder.path().join(name)).ok()
+        }
+
+        fn state(&self) -> [Option<String>; 3] {
+            ["map.shp", "map.dbf", "ref.gpkg"].map(|name| self.read(name))
+        }
+
+        fn work(&self) -> PathBuf {
+            self.folder.path().join("work")
+        }
+    }
+
+    fn all(text: &str) -> [Option<String>; 3] {
+        [(); 3].map(|()| Some(text.into()))
+    }
+
+    #[test]
+    fn all_files_appear_and_replace_old_ones_only_when_told() {
+        for overwrite in [false, true] {
+            let scene = Scene::new(overwrite);
+            scene.publication.run(&scene.work()).unwrap();
+            recover(&scene.work());
+            assert_eq!(scene.state(), all("new"), "and recovery leaves what is complete");
+        }
+    }
+
+    #[test]
+    fn a_place_that_is_taken_undoes_everything() {
+        for taken in ["map.shp", "map.dbf", "ref.gpkg"] {
+            let scene = Scene::new(false);
+            fs::write(scene.folder.path().join(taken), "mine").unwrap();
+            assert!(scene.publication.run(&scene.work()).is_err());
+            let left: Vec<_> = scene.state().into_iter().flatten().collect();
+            assert_eq!(left, ["mine"]);
+        }
+        let scene = Scene::new(true);
+        fs::write(scene.folder.path().join("ref.gpkg"), "mine").unwrap();
+        assert!(scene.publication.run(&scene.work()).is_err());
+        assert_eq!(scene.state(), [Some("old".into()), Some("old".into()), Some("mine".into())]);
+    }
+
+    #[test]
+    fn a_publication_that_was_cut_short_is_undone() {
+        let scene = Scene::new(true);
+        write_durably(&scene.work().join(JOURNAL), &scene.publication.to_bytes()).unwrap();
+        let before = scene.state();
+        for done in 0..3 {
+            if done > 0 {
+                fs::rename(&scene.publication.retired[0].from, &scene.publication.retired[0].to).unwrap();
+            }
+            scene.publication.companions.iter().take(done).for_each(|c| link(c).unwrap());
+            recover(&scene.work());
+            assert_eq!(scene.state(), before, "after {done} links");
+        }
+    }
+
+    #[test]
+    fn a_journal_that_ends_early_means_nothing_was_done() {
+        let bytes = Scene::new(true).publication.to_bytes();
+        for end in 0..bytes.len() {
+            assert!(Publication::from_bytes(&bytes[..end]).is_none(), "{end}");
+        }
+        assert!(Publication::from_bytes(&bytes).is_some());
+    }
+}

@@ -1,0 +1,331 @@
+//! The write side: what a host writes is staged; when it closes the dataset, it is marked and published.
+//!
+//! ```text
+//! host ──layers, fields──> schema (the real driver, an empty dataset: answers what the format can do)
+//!      ──features────────> staging GeoPackage, in the end the REFERENCE
+//! close: staging ──marking──> the real driver ──read_back──> publication
+//! ```
+//!
+//! Nothing a host can do after a failure leads to publication: a writer that failed once only cleans up.
+
+use crate::{
+    error::{Error, Result},
+    ffi_output::{Described, Feature, FeatureRef, Field, LayerSpec, Output},
+    ffi_source::{OwnedSource, View},
+    marking::{Marking, Request},
+    publication::{Move, Publication},
+    read_back,
+    target::{Places, Target},
+    workplace::file_error,
+};
+use std::{fs, path::Path};
+
+/// The column of the staging GeoPackage for the styles of features, made when the first one has a style.
+const STYLE_COLUMN: &str = "OGR_STYLE";
+
+/// Marks an open dataset; the border knows how.
+pub type Mark<'a> = &'a dyn Fn(&Request, &OwnedSource) -> Result<Marking>;
+
+/// A dataset under construction.
+pub struct Writer {
+    // In this order they are dropped: datasets before the folders they are in.
+    schema: Output,
+    staged: Output,
+    target: Target,
+    request: Request,
+    layers: Vec<StagedLayer>,
+    open_transactions: usize,
+    /// Why nothing will be published.
+    failed: Option<String>,
+    places: Places,
+}
+
+struct StagedLayer {
+    spec: LayerSpec,
+    /// For every field of the layer, the one of the staging GeoPackage.
+    columns: Vec<Option<usize>>,
+    /// Fields with several values each.
+    lists: Vec<usize>,
+    /// Names in the staging GeoPackage, lower case.
+    taken: Vec<String>,
+    style_column: Option<usize>,
+    /// Whether the host numbered the features.
+    has_ids: bool,
+}
+
+impl Writer {
+    /// Checks where to write, and makes workplaces there.
+    pub fn new(target: Target, request: Request) -> Result<Self> {
+        let places = target.places(&request)?;
+        let driver = target.format.driver;
+        let schema = Output::create(driver, &places.main.subfolder("schema")?.join(target.file_name()))?;
+        let staged = Output::create("GPKG", &places.staged)?;
+        staged.begin()?;
+        let (layers, open_transactions, failed) = (Vec::new(), 0, None);
+        Ok(Writer { schema, staged, target, request, layers, open_transactions, failed, places })
+    }
+
+    /// The empty dataset of the real driver that hosts are shown.
+    pub fn schema(&self) -> &Output {
+        &self.schema
+    }
+
+    /// What to call the target in messages.
+    pub fn name(&self) -> &str {
+        &self.target.name
+    }
+
+    /// Creates a layer; its number.
+    pub fn add_layer(&mut self, spec: LayerSpec) -> Result<usize> {
+        self.keep_failure(|writer| {
+            let format = writer.target.format;
+            if !writer.layers.is_empty() && !format.many_layers {
+                return Err(Error::OneLayer { driver: format.driver });
+            }
+            writer.schema.add_layer(&spec, false)?;
+            let number = writer.layers.len();
+            let [_, id, geometry] = writer.schema.names(number);
+            let or = |name: String, default: &str| if name.is_empty() { default.into() } else { name };
+            let (id, geometry) = (or(id, "fid"), or(geometry, "geom"));
+            let options = [("FID", &id), ("GEOMETRY_NAME", &geometry), ("SPATIAL_INDEX", &"NO".to_string())];
+            let options = options.map(|(name, value)| (name.to_string(), value.clone()));
+            writer.staged.add_layer(&spec.with_options(options.into()), true)?;
+            let taken = [&id, &geometry, STYLE_COLUMN].map(str::to_lowercase).into();
+            let (columns, lists) = (Vec::new(), Vec::new());
+            writer.layers.push(StagedLayer {
+                spec,
+                columns,
+                lists,
+                taken,
+                style_column: None,
+                has_ids: false,
+            });
+            let fields = writer.schema.fields(number);
+            fields.iter().try_for_each(|field| writer.stage_field(number, field, &field.name))?;
+            Ok(number)
+        })
+    }
+
+    /// Creates a field. That a format has no such field is the host's to know, not a failure of the dataset.
+    pub fn add_field(&mut self, layer: usize, field: &Field, approximate: bool) -> Result<()> {
+        let before = self.schema.field_count(layer);
+        self.schema.add_field(layer, field, approximate, false)?;
+        let fields = self.schema.fields(layer);
+        let added = &fields[before.min(fields.len())..];
+        self.keep_failure(|writer| {
+            added.iter().try_for_each(|added| writer.stage_field(layer, added, &field.name))
+        })
+    }
+
+    fn stage_field(&mut self, number: usize, field: &Field, name: &str) -> Result<()> {
+        let layer = &mut self.layers[number];
+        let mut unique = name.to_string();
+        let mut copy = 2;
+        while layer.taken.contains(&unique.to_lowercase()) {
+            unique = format!("{name}_{copy}");
+            copy += 1;
+        }
+        layer.taken.push(unique.to_lowercase());
+        let column = self.staged.field_count(number);
+        self.staged.add_field(
+            number,
+            &field.staged(unique, self.target.format.driver == "GPKG"),
+            true,
+            true,
+        )?;
+        if field.is_list() {
+            layer.lists.push(layer.columns.len());
+        }
+        layer.columns.push(Some(column));
+        Ok(())
+    }
+
+    /// Stages a feature and gives it its id.
+    pub fn write(&mut self, layer: usize, feature: FeatureRef) -> Result<()> {
+        self.keep_failure(|writer| {
+            let quiet = writer.target.format.driver != "GPKG"; // complaints of GeoPackage are not the format's
+            let staged = writer.layers[layer].stage(&writer.staged, layer, feature)?;
+            let id = writer.staged.write(layer, &staged, quiet)?;
+            feature.set_id(id);
+            Ok(())
+        })
+    }
+
+    /// A host begins a transaction.
+    pub fn begin(&mut self) {
+        self.open_transactions += 1;
+    }
+
+    /// A host commits one; false when there is none.
+    pub fn commit(&mut self) -> bool {
+        let open = self.open_transactions > 0;
+        self.open_transactions -= usize::from(open);
+        open
+    }
+
+    /// A host takes back what it wrote: then the rest is not the whole either.
+    pub fn roll_back(&mut self) {
+        self.open_transactions = self.open_transactions.saturating_sub(1);
+        self.failed.get_or_insert("a transaction was rolled back".into());
+    }
+
+    fn keep_failure<T>(&mut self, f: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if let Some(reason) = &self.failed {
+            return Err(Error::Unfinished(reason.clone()));
+        }
+        let result = f(self);
+        if let Err(error) = &result {
+            self.failed = Some(error.to_string());
+        }
+        result
+    }
+
+    /// Marks, writes, reads back and publishes; `host_failure` is what the host reported before it closed the
+    /// dataset. Returns what the user should read though nothing failed.
+    pub fn finish(
+        self,
+        described: &Described,
+        host_failure: Option<String>,
+        mark: Mark,
+        threads: usize,
+    ) -> Result<Vec<String>> {
+        if let Some(reason) = self.why_not(host_failure) {
+            return Err(Error::Unfinished(reason));
+        }
+        // Dropped in reverse order: datasets before the folders they are in.
+        let Writer { places, target, request, layers, schema, staged, .. } = self;
+        staged.describe(described);
+        (0..layers.len()).for_each(|layer| staged.describe_layer(layer, described));
+        staged.commit()?;
+        staged.close()?;
+        let source = OwnedSource::open(&places.staged.display().to_string())?;
+        let marking = mark(&request, &source)?;
+        let view = View::new(source, marking)?;
+        let folder = places.main.subfolder("out")?;
+        let file = folder.join(target.file_name());
+        let names = write_marked(&file, &target, &schema, &layers, &view, described)?;
+        let written = read_back::Written { path: &file, format: target.format, layers: names };
+        read_back::check(&written, &view, &request, threads)?;
+        let warnings = view.marking().warnings.clone();
+        let record = view.marking().record.clone();
+        drop((view, schema));
+        publish(&target, &places, &folder, &record)?;
+        Ok(warnings)
+    }
+
+    fn why_not(&self, host_failure: Option<String>) -> Option<String> {
+        let open = (self.open_transactions > 0).then(|| "a transaction is still open".to_string());
+        let reported =
+            host_failure.map(|reason| format!("a failure was reported before it was closed ({reason})"));
+        self.failed.clone().or(open).or(reported)
+    }
+}
+
+impl StagedLayer {
+    /// The feature as the staging GeoPackage keeps it.
+    fn stage(&mut self, staged: &Output, number: usize, feature: FeatureRef) -> Result<Feature> {
+        let style = feature.style();
+        if style.is_some() && self.style_column.is_none() {
+            self.style_column = Some(staged.field_count(number));
+            staged.add_field(number, &Field::text(STYLE_COLUMN.into()), false, true)?;
+        }
+        let copy = staged.feature(number);
+        copy.copy_from(feature, &self.columns, &self.lists)?;
+        if let (Some(column), Some(style)) = (self.style_column, style) {
+            copy.set_text(column, &style);
+        }
+        if let Some(id) = feature.id() {
+            self.has_ids = true;
+            copy.set_id(id);
+        }
+        Ok(copy)
+    }
+
+    /// For every column of the staging GeoPackage, the field of the layer.
+    fn fields_of_columns(&self) -> Vec<Option<usize>> {
+        let last = self.columns.iter().flatten().copied().chain(self.style_column).max();
+        let mut fields = vec![None; last.map_or(0, |last| last + 1)];
+        for (field, column) in self.columns.iter().enumerate() {
+            if let Some(column) = *column {
+                fields[column] = Some(field);
+            }
+        }
+        fields
+    }
+}
+
+/// Writes all marked layers by the real driver, one after the other; their names in it.
+fn write_marked(
+    path: &Path,
+    target: &Target,
+    schema: &Output,
+    layers: &[StagedLayer],
+    view: &View,
+    described: &Described,
+) -> Result<Vec<read_back::WrittenLayer>> {
+    let mut output = Output::create(target.format.driver, path)?;
+    output.describe(described);
+    output.copy_domains(schema);
+    if target.format.many_layers {
+        output.begin()?;
+    }
+    let mut written = Vec::new();
+    for (number, layer) in layers.iter().enumerate() {
+        output.add_layer(&layer.spec, true)?;
+        output.describe_layer(number, described);
+        for field in schema.fields(number).iter().skip(output.field_count(number)) {
+            output.add_field(number, field, true, true)?;
+        }
+        let fields = layer.fields_of_columns();
+        view.for_each(&layer.spec.name, |marked| {
+            let feature = output.feature(number);
+            feature.copy_from(marked.borrow(), &fields, &[])?;
+            if let Some(column) = layer.style_column {
+                feature.set_style(&marked.borrow().text(column));
+            }
+            if let (true, Some(id)) = (layer.has_ids, marked.borrow().id()) {
+                feature.set_id(id);
+            }
+            output.write(number, &feature, true).map(drop)
+        })?;
+        let [name, ..] = output.names(number);
+        let options = layer.spec.options.clone();
+        written.push(read_back::WrittenLayer { staged: layer.spec.name.clone(), name, options });
+    }
+    if target.format.many_layers {
+        output.commit()?;
+    }
+    output.close()?;
+    Ok(written)
+}
+
+/// Puts record, reference and the files in `folder` into their places.
+fn publish(target: &Target, places: &Places, folder: &Path, record: &str) -> Result<()> {
+    let mut publication = Publication { overwrite: target.replaces, ..Publication::default() };
+    if let Some((staged, to)) = &places.record {
+        fs::write(staged, record).map_err(|e| file_error("writing", staged, e))?;
+        let is_there = fs::read(to).is_ok_and(|bytes| bytes == record.as_bytes());
+        if !is_there {
+            publication.companions.push(Move { from: staged.clone(), to: to.clone() });
+        }
+    }
+    publication.companions.push(Move { from: places.staged.clone(), to: target.reference.clone() });
+    let retired_folder = places.main.subfolder("old")?;
+    for path in target.side_files(folder)? {
+        publication
+            .retired
+            .push(Move { to: retired_folder.join(path.file_name().unwrap_or_default()), from: path });
+    }
+    let entries = fs::read_dir(folder).map_err(|e| file_error("reading", folder, e))?;
+    for entry in entries.flatten() {
+        if entry.path().is_dir() {
+            return Err(Error::Folder { driver: target.format.driver });
+        }
+        let part = Move { to: target.path.with_file_name(entry.file_name()), from: entry.path() };
+        match part.to == target.path {
+            true => publication.main = part,
+            false => publication.companions.push(part),
+        }
+    }
+    publication.run(places.main.folder())
+}
