@@ -39,7 +39,7 @@ pub fn register(
         _ => registrar.register(side(&map), start),
     };
     // Where the numbers were not reprojected they are taken to be in the reference's CRS.
-    let has_numbers = is_raw && map.vertices.len() > 0;
+    let has_numbers = is_raw && !map.vertices.is_empty();
     let own =
         reference.crs.clone().filter(|_| has_numbers).map(|crs| Assumption { crs, axes_swapped: false });
     let plain = Registered::new(map, own.as_ref(), at_first);
