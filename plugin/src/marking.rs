@@ -10,13 +10,11 @@ use meshmark_core::{
     carrier::Carrier,
     demodulation,
     embedding::{self, Marked},
-    ground::Ground,
     key::SecretKey,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Subject},
     patches::Patches,
     record::{self, Record, Reference, TopologyEntry},
-    vertices::VertexTable,
 };
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey, wkb};
 use std::{fs::File, io::Read, path::Path};
