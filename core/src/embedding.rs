@@ -14,7 +14,7 @@ use crate::{
     placement::Placement,
     response::Response,
     spectrum::Basis,
-    topology::settle,
+    topology::{Settled, settle},
 };
 use rayon::prelude::*;
 
@@ -62,7 +62,7 @@ pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Paramet
     let signs = parameters.code.encode(message);
     let job = Job { map, carrier: Carrier::new(key), signs, carriers, parameters };
     let settled = settle(map, &tree, patches.constraints(), &job.wanted(&patches)?, &placement);
-    job.check_message(message, &patches, &settled.coords)?;
+    job.check_message(message, &patches, &settled)?;
     Ok(Marked {
         displacement: displacement(map, &settled.coords),
         coords: settled.coords,
@@ -128,14 +128,14 @@ impl Job<'_> {
     }
 
     /// Reads the message back as the verifier does, from as many patches as it takes.
-    fn check_message(&self, message: &Message, patches: &Patches, coords: &[[f64; 2]]) -> Result<()> {
+    fn check_message(&self, message: &Message, patches: &Patches, settled: &Settled) -> Result<()> {
         let from = self.map.vertices.coords().iter();
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));
-        let observed: Vec<Option<[f64; 2]>> = from.zip(coords).map(moved).collect();
+        let observed: Vec<Option<[f64; 2]>> = from.zip(&settled.coords).map(moved).collect();
         let [_, metres_per_unit] = self.map.ground.metres_per_unit(self.map.vertices.centre());
         let rounding_m = self.parameters.precision.unwrap_or(0.0) * metres_per_unit / 12f64.sqrt();
         let disturbance = Prediction {
-            deformation: Deformation::none(rounding_m.max(LEAST_NOISE_M)),
+            deformation: Deformation::none(rounding_m.hypot(settled.deviation_m).max(LEAST_NOISE_M)),
             displacement_m: Vec::new(),
             weights: vec![1.0; observed.len()],
         };

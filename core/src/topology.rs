@@ -29,6 +29,8 @@ pub(crate) struct Settled {
     pub coords: Vec<[f64; 2]>,
     /// How many vertices moved otherwise than they should have.
     pub attenuated: usize,
+    /// By how much, metres along an axis: root mean square over all vertices.
+    pub deviation_m: f64,
 }
 
 /// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest to it, as far as
@@ -55,7 +57,13 @@ pub(crate) fn settle(
         changed = Some(movement.advance());
     }
     let attenuated = free.iter().zip(&movement.coords).filter(|(a, b)| a != b).count();
-    Settled { coords: movement.coords, attenuated }
+    let apart = |(a, b): (&[f64; 2], &[f64; 2])| {
+        let [dx, dy] = map.ground.metres_between(*a, *b);
+        dx * dx + dy * dy
+    };
+    let energy: f64 = free.iter().zip(&movement.coords).map(apart).sum();
+    let deviation_m = (energy / (2 * wanted.len()) as f64).sqrt();
+    Settled { coords: movement.coords, attenuated, deviation_m }
 }
 
 /// A vertex and a segment that come together.

@@ -23,7 +23,7 @@ struct Sketch {
     sides: Vec<[u32; 2]>,
 }
 
-/// A map.
+/// A map of about a thousand vertices: room for a short message.
 struct Town {
     vertices: VertexTable,
     segments: Vec<[u32; 2]>,
@@ -33,7 +33,7 @@ struct Town {
 impl Town {
     fn mark(&self, parameters: &Parameters) -> Marked {
         let key = SecretKey::from_bytes([9; 32]);
-        embed(&self.map(), &key, &Message::from_hex("0123456789abcdef").unwrap(), parameters).unwrap()
+        embed(&self.map(), &key, &Message::from_hex("0123").unwrap(), parameters).unwrap()
     }
 
     fn map(&self) -> Map<'_> {
