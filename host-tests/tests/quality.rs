@@ -21,10 +21,7 @@ fn no_polygon_becomes_invalid_and_none_overlap_that_did_not() {
             let host = Host::new();
             host.copy(fixture, "map.gpkg");
             let (shape, basis) = (format!("SHAPE={shape}"), format!("BASIS={basis}"));
-            let small = ["-oo", "MESSAGE=0123456789abcdef", "-oo", "PATCH_SIZE=300"];
             let options = ["-oo", "RECORD=record.json", "-oo", &shape, "-oo", &basis];
-            let options =
-                if fixture == "shapes.gpkg" { [&small[..], &options].concat() } else { options.to_vec() };
             host.mark("GPKG", "marked.gpkg", "map.gpkg", &options).succeeds();
             let compared = meshmark(&host, &["compare", "--json", "map.gpkg", "marked.gpkg"]);
             for pointer in [
@@ -58,7 +55,7 @@ fn right_angles_stay_right_when_shapes_are_rigid_and_the_message_is_read() {
         let options = ["-oo", "RECORD=record.json", "-oo", "SHAPE=RIGID", "-oo", &basis];
         host.mark("GPKG", "marked.gpkg", "map.gpkg", &options).succeeds();
         let compared =
-            meshmark(&host, &["compare", "--json", "--layer", "buildings", "map.gpkg", "marked.gpkg"]);
+            meshmark(&host, &["compare", "--json", "--layers", "buildings", "map.gpkg", "marked.gpkg"]);
         assert_eq!(number(&compared, "/angles/right_angles_kept"), 1.0, "{compared:#}");
         assert!(number(&compared, "/displacement/rms_m") > 0.08);
         let verify =

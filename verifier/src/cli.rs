@@ -50,9 +50,9 @@ struct CompareArgs {
     reference: PathBuf,
     /// The marked map
     marked: PathBuf,
-    /// Layer to compare; repeatable, all by default
-    #[arg(long, value_name = "LAYER")]
-    layer: Vec<String>,
+    /// Comma-separated layers to compare; all by default
+    #[arg(long, value_delimiter = ',')]
+    layers: Vec<String>,
     /// Print the comparison as one JSON object
     #[arg(long)]
     json: bool,
@@ -191,7 +191,7 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
 }
 
 fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
-    let layers = (!args.layer.is_empty()).then_some(args.layer.as_slice());
+    let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
     let comparison = compare(&args.reference, &args.marked, layers)?;
     print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
     Ok(ExitCode::Match)
