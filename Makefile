@@ -12,7 +12,7 @@ BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults conformance install uninstall fixtures deps lint
+.PHONY: build test demo bench table2 false-alarms faults quality conformance install uninstall fixtures deps lint
 
 build: deps
 	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
@@ -33,6 +33,11 @@ bench: build
 table2: build
 	$(CARGO) build --release --locked -p meshmark-host-tests --bins
 	$(BUILD)/table2 --out target/table2 $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+
+# What marking does to shape and topology, with every SHAPE and BASIS; fails when anything became invalid.
+quality: build
+	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(BUILD)/quality $(or $(MAPS),$(wildcard ../shared/maps/dev/*.gpkg ../shared/maps/variety/*.gpkg),$(FIXTURES))
 
 # p-values of wrong keys and wrong recipients.
 false-alarms: build

@@ -11,6 +11,7 @@ use crate::{
     noise_law::NoiseLaw,
     options::Parameters,
     patches::{Patch, Patches},
+    response::Response,
     spectrum::Basis,
 };
 use faer::{
@@ -271,8 +272,10 @@ pub(crate) struct Found {
 impl Found {
     pub fn new(patches: &Patches, patch: &Patch, observed: &Observed) -> Self {
         let all = patch.vertices.iter().enumerate();
-        let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) =
-            all.filter_map(|(row, &v)| Some((row, observed[v as usize]?))).unzip();
+        let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) = all
+            .filter(|(row, _)| !patch.hangs_elsewhere(*row))
+            .filter_map(|(row, &v)| Some((row, observed[v as usize]?)))
+            .unzip();
         let at = rows.iter().map(|&row| patches.positions_m()[patch.vertices[row] as usize]).collect();
         Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
     }
@@ -361,11 +364,10 @@ impl Sample {
         found.at.truncate(SAMPLE_VERTICES);
         let basis = Basis::low_frequencies(patch, carriers + 1)?;
         let count = found.rows.len();
-        let signatures = Mat::from_fn(count, carriers, |o, i| {
-            parameters.amplitude_m * basis.vectors[(found.rows[o], i + 1)]
-        });
+        let seen = Response::carriers(patch, &basis, parameters.shape).rows(&found.rows);
         let moved = found.moved.subrows(0, count).to_owned();
-        Ok(Sample { at: found.at, moved, mark: &signatures * signatures.transpose() })
+        let mark = seen.covariance() * faer::Scale(parameters.amplitude_m.powi(2));
+        Ok(Sample { at: found.at, moved, mark })
     }
 
     /// log p(y) of both axes, but for a constant.
@@ -406,14 +408,15 @@ fn most_likely(log_likelihood: impl Fn(&Deformation) -> f64) -> Deformation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ground::Ground, vertices::VertexTable};
+    use crate::{ground::Ground, map::Map, vertices::VertexTable};
 
     /// 600 scattered vertices on 300 m × 300 m in two patches.
     fn patches() -> Patches {
         let hash = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29) % 300_000;
         let coords = (0..600).map(|i| [hash(i) as f64 / 1e3, hash(i + 7777) as f64 / 1e3]).collect();
         let table = VertexTable::new(coords).unwrap();
-        Patches::new(&table, &Ground::Plane { metres_per_unit: 1.0 }, 300).unwrap()
+        let parameters = Parameters { patch_size: 300, ..Parameters::default() };
+        Patches::new(&Map::of_points(&table, Ground::Plane { metres_per_unit: 1.0 }), &parameters).unwrap()
     }
 
     fn wave([x, y]: [f64; 2]) -> [f64; 2] {

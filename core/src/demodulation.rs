@@ -12,15 +12,10 @@ use crate::{
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
+    response::{Kernel, Response},
     spectrum::Basis,
 };
-use faer::{
-    Accum, Mat, Par,
-    linalg::{
-        matmul::triangular::{self, BlockStructure},
-        solvers::Solve,
-    },
-};
+use faer::{Mat, linalg::solvers::Solve};
 use rand_chacha::{
     ChaCha20Rng,
     rand_core::{Rng, SeedableRng},
@@ -219,13 +214,11 @@ pub fn joint(
         let weights: Vec<f64> =
             found.rows.iter().map(|&row| disturbance.weights[patch.vertices[row] as usize]).collect();
         let covariance = Covariance::new(&disturbance.deformation, &found.at, &weights);
-        let seen = covariance.whiten(Mat::from_fn(found.rows.len(), job.carriers, |o, i| {
-            basis.vectors[(found.rows[o], i + 1)]
-        }));
-        let kernel = lower_gram(&seen);
-        let product = seen.transpose() * covariance.whiten(found.moved.clone());
-        let correlations = [0, 1].map(|axis| product.col_as_slice(axis).to_vec());
-        let trace = 2.0 * (0..job.carriers).map(|i| kernel[(i, i)]).sum::<f64>();
+        let seen = Response::carriers(patch, basis, parameters.shape).rows(&found.rows);
+        let seen = seen.map(|block| covariance.whiten(block));
+        let kernel = seen.kernel();
+        let correlations = seen.correlations(&covariance.whiten(found.moved.clone()));
+        let trace = kernel.trace();
         Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
     })?;
     let amplitude_m = parameters.amplitude_m;
@@ -241,23 +234,6 @@ pub fn joint(
         expected_sum: amplitude_m * sums.trace,
         noise_m: disturbance.deformation.noise_m,
     })
-}
-
-/// The lower triangle of XᵀX, zeros above it.
-fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
-    let mut gram = Mat::zeros(x.ncols(), x.ncols());
-    triangular::matmul(
-        gram.as_mut(),
-        BlockStructure::TriangularLower,
-        Accum::Replace,
-        x.transpose(),
-        BlockStructure::Rectangular,
-        x,
-        BlockStructure::Rectangular,
-        1.0,
-        Par::Seq,
-    );
-    gram
 }
 
 /// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹, of the lower triangle of G.
@@ -344,16 +320,26 @@ impl<'a> Job<'a> {
         bit_of_coefficient(i + 1, self.parameters.chip_rate)
     }
 
-    /// The lower triangle of Cᵀ diag(p) K diag(p) C over both axes, m × m, from that of K, m·c × m·c.
-    fn fold(&self, kernel: &Mat<f64>, chips: &[Vec<f64>; 2]) -> Mat<f64> {
+    /// The lower triangle of Cᵀ diag(p) K diag(p) C, m × m, from the kernel K of both axes, 2·m·c × 2·m·c.
+    fn fold(&self, kernel: &Kernel, chips: &[Vec<f64>; 2]) -> Mat<f64> {
         let mut gram = Mat::zeros(self.bits, self.bits);
-        for k in 0..self.carriers {
-            let column = &kernel.col_as_slice(k)[k..];
-            for (i, value) in (k..self.carriers).zip(column) {
-                let sign = chips[0][i] * chips[0][k] + chips[1][i] * chips[1][k];
-                // Two chips of one bit meet on the diagonal, once from either side of K's.
-                let times = if i != k && self.bit(i) == self.bit(k) { 2.0 } else { 1.0 };
-                gram[(self.bit(i), self.bit(k))] += times * sign * value;
+        // Two chips of one bit meet on the diagonal, once from either side of K's.
+        let times = |i: usize, k: usize| if self.bit(i) == self.bit(k) { 2.0 } else { 1.0 };
+        for (axes, lower) in &kernel.own {
+            for k in 0..self.carriers {
+                for (i, value) in (k..self.carriers).zip(&lower.col_as_slice(k)[k..]) {
+                    let sign: f64 = axes.iter().map(|&axis| chips[axis][i] * chips[axis][k]).sum();
+                    let times = if i == k { 1.0 } else { times(i, k) };
+                    gram[(self.bit(i), self.bit(k))] += times * sign * value;
+                }
+            }
+        }
+        if let Some(cross) = &kernel.cross {
+            for k in 0..self.carriers {
+                for (i, value) in cross.col_as_slice(k).iter().enumerate() {
+                    let (row, column) = (self.bit(i.max(k)), self.bit(i.min(k)));
+                    gram[(row, column)] += times(i, k) * chips[0][i] * chips[1][k] * value;
+                }
             }
         }
         gram

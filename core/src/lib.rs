@@ -8,23 +8,23 @@
 //! ```
 //! use meshmark_core::{
 //!     carrier::Carrier, deformation::Deformation, demodulation, embedding, ground::Ground, key::SecretKey,
-//!     message::Message, options::Parameters, patches::Patches, vertices::VertexTable,
+//!     map::Map, message::Message, options::Parameters, patches::Patches, vertices::VertexTable,
 //! };
 //! # fn main() -> Result<(), meshmark_core::Error> {
 //! // A map of 30 × 30 slightly uneven vertices, 10 m apart.
 //! let jitter = |i: usize| (i * 7919 % 101) as f64 / 40.0;
 //! let coords = (0..900).map(|i| [(i % 30 * 10) as f64 + jitter(i), (i / 30 * 10) as f64 + jitter(i + 1)]);
 //! let table = VertexTable::new(coords.collect())?;
-//! let ground = Ground::Plane { metres_per_unit: 1.0 };
+//! let map = Map::of_points(&table, Ground::Plane { metres_per_unit: 1.0 });
 //! let key = SecretKey::from_bytes([7; 32]);
 //! let message = Message::from_hex("00112233445566778899aabbccddeeff")?;
 //! let parameters = Parameters::default();
 //!
-//! let marked = embedding::embed(&table, &ground, &key, &message, &parameters)?;
+//! let marked = embedding::embed(&map, &key, &message, &parameters)?;
 //! assert!(marked.displacement.max_m < parameters.tolerance_m);
 //!
 //! // The auditor has the reference, the key and the marked map.
-//! let patches = Patches::new(&table, &ground, parameters.patch_size)?;
+//! let patches = Patches::new(&map, &parameters)?;
 //! let moved = table.coords().iter().zip(&marked.coords);
 //! let observed: Vec<_> = moved.map(|(r, s)| Some([s[0] - r[0], s[1] - r[1]])).collect();
 //! let disturbance = Deformation::none(0.01).predict(&patches, &observed, 256, parameters.amplitude_m);
@@ -36,21 +36,30 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod bodies;
 pub mod carrier;
 pub mod code;
+pub mod constraints;
 pub mod deformation;
 pub mod demodulation;
 pub mod embedding;
 mod error;
 pub mod ground;
+pub mod junctions;
 pub mod key;
+pub mod map;
 pub mod mesh;
 pub mod message;
+mod motion;
+mod nearness;
 pub mod noise_law;
 pub mod options;
 pub mod patches;
+mod placement;
 pub mod record;
+mod response;
 pub mod spectrum;
+mod topology;
 mod tridiagonal;
 pub mod vertices;
 

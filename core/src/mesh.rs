@@ -9,6 +9,7 @@ use std::collections::HashMap;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     edges: Vec<[u32; 2]>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Mesh {
@@ -37,12 +38,21 @@ impl Mesh {
             })
             .collect();
         edges.sort_unstable();
-        Ok(Mesh { edges })
+        let corners = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, _, _, _, _>| {
+            face.vertices().map(|v| number.of(v.fix().index(), v.position()))
+        };
+        let triangles = triangulation.inner_faces().map(corners).collect();
+        Ok(Mesh { edges, triangles })
     }
 
     /// Edges as pairs of vertex indices `[i, j]`, i < j, sorted.
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.edges
+    }
+
+    /// Triangles as their corners, counter-clockwise, in no order to rely on.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
     }
 }
 

@@ -2,6 +2,7 @@
 //! the command line and the table in the docs.
 
 use crate::{Error, Result, code::Code, key::SecretKey, message::Message};
+use serde::{Deserialize, Serialize};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
 /// need minutes and gigabytes a solve.
@@ -157,6 +158,20 @@ pub const OPTIONS: &[OptionSpec] = &[
         true,
         "Comma-separated layers to mark together; the others pass unchanged; all by default",
     ),
+    row(
+        "SHAPE",
+        Kind::Choice(&Shape::NAMES),
+        Some("FREE"),
+        true,
+        "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them",
+    ),
+    row(
+        "BASIS",
+        Kind::Choice(&Laplacian::NAMES),
+        Some("BIGGS"),
+        true,
+        "Mesh Laplacian: BIGGS is that of the paper; COTANGENT bends angles less and needs the very same reference",
+    ),
     row("SRS", Kind::Text, None, true, "CRS of the source when it has none, for example EPSG:3067"),
     row(
         "RECORD",
@@ -204,6 +219,10 @@ pub struct Parameters {
     pub patch_size: usize,
     /// No vertex moves further, metres on the ground.
     pub tolerance_m: f64,
+    /// What moves as one.
+    pub shape: Shape,
+    /// Which functions carry the mark.
+    pub laplacian: Laplacian,
     /// Grid of the marked coordinates, CRS units.
     pub precision: Option<f64>,
 }
@@ -211,6 +230,54 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Options::parse([("MESSAGE", "00")]).expect("the defaults are legal").parameters
+    }
+}
+
+/// Which vertices move as one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// None but what hangs on others.
+    Free,
+    /// Those of a building: a group of polygons that share vertices or walls, see [`crate::bodies`].
+    Rigid,
+}
+
+impl Shape {
+    /// What SHAPE may be.
+    pub const NAMES: [&str; 2] = ["FREE", "RIGID"];
+
+    fn from_name(name: &str) -> Option<Self> {
+        [Shape::Free, Shape::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
+    }
+
+    /// The option's value.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+}
+
+/// Whose eigenvectors carry the mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Laplacian {
+    /// I − D⁻¹A of the mesh (the paper).
+    Biggs,
+    /// The Dirichlet Laplacian of the mesh: it knows distances and angles.
+    Cotangent,
+}
+
+impl Laplacian {
+    /// What BASIS may be.
+    pub const NAMES: [&str; 2] = ["BIGGS", "COTANGENT"];
+
+    fn from_name(name: &str) -> Option<Self> {
+        [Laplacian::Biggs, Laplacian::Cotangent].into_iter().find(|l| l.name().eq_ignore_ascii_case(name))
+    }
+
+    /// The option's value.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
     }
 }
 
@@ -260,7 +327,7 @@ impl Options {
         let values = Values::collect(OPTIONS, pairs)?;
         let precision = values.number("PRECISION")?;
         let subject = values.subject()?;
-        let code = values.code()?;
+        let code = values.choice("CODE", Code::from_name)?;
         if let Some(Subject::Message(message)) = &subject {
             code.channel_bits(message.len())?;
         }
@@ -273,6 +340,8 @@ impl Options {
                 chip_rate: values.integer("CHIP_RATE")?.unwrap_or(code.default_chip_rate()),
                 patch_size: values.integer("PATCH_SIZE")?.expect("has a default"),
                 tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
+                shape: values.choice("SHAPE", Shape::from_name)?,
+                laplacian: values.choice("BASIS", Laplacian::from_name)?,
                 precision,
             },
             layers: values.list("LAYERS")?,
@@ -346,8 +415,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    fn code(&self) -> Result<Code> {
-        Ok(self.parsed("CODE", |_, text| Code::from_name(text))?.expect("has a default"))
+    fn choice<T>(&self, name: &str, from_name: impl Fn(&str) -> Option<T>) -> Result<T> {
+        Ok(self.parsed(name, |_, text| from_name(text))?.expect("has a default"))
     }
 
     /// The value given, or the default, as `parse` understands it.
@@ -449,6 +518,7 @@ mod tests {
         let p = Parameters::default();
         assert_eq!((p.amplitude_m, p.chip_rate, p.patch_size), (0.10, 2, 480));
         assert_eq!((p.tolerance_m, p.precision, p.code), (0.75, None, Code::Repetition));
+        assert_eq!((p.shape, p.laplacian), (Shape::Free, Laplacian::Biggs));
         let chip_rate = |pairs: &[_]| Options::parse(pairs.iter().copied()).unwrap().parameters.chip_rate;
         assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 2, with LDPC 1"));
         assert_eq!((chip_rate(&[]), chip_rate(&[("CODE", "LDPC")])), (2, 1));
@@ -464,6 +534,8 @@ mod tests {
         assert!(error(&[("CHIP_RATE", "2.5")]).contains("whole number from 1"));
         assert!(error(&[("PATCH_SIZE", "3")]).contains("from 16 to 4096"));
         assert!(error(&[("CODE", "morse")]).contains("CODE=morse is not REPETITION or LDPC"));
+        assert!(error(&[("SHAPE", "round")]).contains("SHAPE=round is not FREE or RIGID"));
+        assert!(error(&[("BASIS", "sines")]).contains("BASIS=sines is not BIGGS or COTANGENT"));
         let short = error(&[("CODE", "LDPC"), ("MESSAGE", "0123456789abcdef")]);
         assert!(short.contains("exactly 128 bits, not 64: use 32 hexadecimal digits"), "{short}");
         assert!(error(&[("COLOUR", "red")]).contains("unknown option COLOUR: use KEY, "));

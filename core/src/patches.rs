@@ -1,16 +1,67 @@
 //! Patches: the map cut into pieces of nearly `patch_size` vertices, each with its connected graph
 //! (paper, section 3.2; the split and the bridges are ours, see docs/method.md).
 
-use crate::{Error, Result, ground::Ground, mesh::Mesh, options::Parameters, vertices::VertexTable};
+use crate::{
+    Error, Result,
+    constraints::Constraints,
+    map::Map,
+    mesh::Mesh,
+    nearness::{VertexTree, cross, dot},
+    options::{Laplacian, Parameters},
+};
+use faer::Mat;
 use rayon::prelude::*;
 
 /// One patch: some vertices of the map and the mesh edges among them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Patch {
     /// Canonical indices of the patch's vertices, ascending; `n` of them.
     pub vertices: Vec<u32>,
     /// Edges as pairs of positions in `vertices`, `[i, j]` with i < j, sorted; they join all vertices.
     pub edges: Vec<[u32; 2]>,
+    /// How strongly each edge joins its ends, with [`Laplacian::Cotangent`]; empty with [`Laplacian::Biggs`].
+    pub weights: Vec<f64>,
+    /// The T-junctions among the vertices, ascending.
+    pub hanging: Vec<HangingRow>,
+    /// The bodies among the vertices.
+    pub bodies: Vec<BodyRows>,
+}
+
+/// A body of a patch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyRows {
+    /// Positions of its vertices.
+    pub rows: Vec<u32>,
+    /// Where each of them is from the mean of all, metres.
+    pub arms_m: Vec<[f64; 2]>,
+}
+
+/// A vertex of a patch that moves with others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HangingRow {
+    /// Its position in the patch.
+    pub row: u32,
+    /// Positions and weights of what it hangs on; none when part of that is in another patch.
+    pub anchors: Vec<(u32, f64)>,
+}
+
+impl Patch {
+    /// Lets the rows of hanging vertices follow (n × any): from what vertices would do to what they do.
+    pub(crate) fn follow(&self, rows: &mut Mat<f64>) {
+        for column in 0..rows.ncols() {
+            for hanging in &self.hanging {
+                let terms =
+                    hanging.anchors.iter().map(|&(anchor, weight)| weight * rows[(anchor as usize, column)]);
+                rows[(hanging.row as usize, column)] = terms.sum();
+            }
+        }
+    }
+
+    /// Whether a vertex hangs on vertices of other patches, so that this one does not tell how it moves.
+    pub(crate) fn hangs_elsewhere(&self, row: usize) -> bool {
+        let found = self.hanging.binary_search_by_key(&(row as u32), |hanging| hanging.row);
+        found.is_ok_and(|i| self.hanging[i].anchors.is_empty())
+    }
 }
 
 /// All patches of a map, in the order of the k-d tree's leaves. Every vertex is in exactly one.
@@ -18,6 +69,7 @@ pub struct Patch {
 pub struct Patches {
     patches: Vec<Patch>,
     positions_m: Vec<[f64; 2]>,
+    constraints: Constraints,
 }
 
 impl Patches {
@@ -25,7 +77,13 @@ impl Patches {
     ///
     /// # Errors
     /// [`Error::TooFewVertices`] and [`Error::Collinear`].
-    pub fn new(table: &VertexTable, ground: &Ground, patch_size: usize) -> Result<Self> {
+    pub fn new(map: &Map, parameters: &Parameters) -> Result<Self> {
+        Self::with_tree(map, &VertexTree::of_all(map), parameters)
+    }
+
+    /// The same with a tree of all vertices.
+    pub(crate) fn with_tree(map: &Map, tree: &VertexTree, parameters: &Parameters) -> Result<Self> {
+        let (Map { vertices: table, ground, .. }, patch_size) = (map, parameters.patch_size);
         if table.is_empty() {
             return Err(Error::NoVertices);
         }
@@ -34,12 +92,18 @@ impl Patches {
         }
         let points = table.local(ground.x_scale(table.centre()[1]));
         let mesh = Mesh::delaunay(&points)?;
-        let leaves = split(&points, points.len() / patch_size);
-        let mut patches = with_edges(leaves, mesh.edges(), points.len());
+        let constraints = Constraints::find(map, tree, parameters.shape);
+        let leaves = split(&points, &constraints, points.len() / patch_size);
+        let place = Place::of_all(&leaves, points.len());
+        let mut patches = with_edges(leaves, mesh.edges(), &place);
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
+        constrain(&mut patches, &constraints, &place);
+        if parameters.laplacian == Laplacian::Cotangent {
+            weigh(&mut patches, mesh.triangles(), &place, &points);
+        }
         let [_, metres] = ground.metres_per_unit(table.centre());
         let positions_m = points.iter().map(|p| p.map(|value| value * metres)).collect();
-        Ok(Patches { patches, positions_m })
+        Ok(Patches { patches, positions_m, constraints })
     }
 
     /// The patches; the position of a patch is its number.
@@ -55,6 +119,17 @@ impl Patches {
     /// Where the vertices are, in canonical order, metres from the map's middle: for distances.
     pub fn positions_m(&self) -> &[[f64; 2]] {
         &self.positions_m
+    }
+
+    /// What keeps vertices from moving freely.
+    pub fn constraints(&self) -> &Constraints {
+        &self.constraints
+    }
+
+    /// The first `count` patches alone; the vertices of the others are in none.
+    pub(crate) fn head(&self, count: usize) -> Self {
+        let patches = self.patches[..count.min(self.patches.len())].to_vec();
+        Patches { patches, positions_m: self.positions_m.clone(), constraints: Constraints::default() }
     }
 
     /// How many coefficients of a patch and axis carry a message of `bits` bits: one for every channel bit and
@@ -93,15 +168,21 @@ impl Patches {
 }
 
 /// k-d split into `parts` leaves of nearly equal vertex counts, each set cut across the longer side
-/// of its bounding box, in proportion to the leaves on either side.
-fn split(points: &[[f64; 2]], parts: usize) -> Vec<Vec<u32>> {
+/// of its bounding box, in proportion to the leaves on either side. A body goes where its first vertex goes.
+fn split(points: &[[f64; 2]], constraints: &Constraints, parts: usize) -> Vec<Vec<u32>> {
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     let mut leaves = Vec::with_capacity(parts);
-    split_set(points, &mut order, parts, &mut leaves);
+    split_set(points, constraints, &mut order, parts, &mut leaves);
     leaves
 }
 
-fn split_set(points: &[[f64; 2]], set: &mut [u32], parts: usize, leaves: &mut Vec<Vec<u32>>) {
+fn split_set(
+    points: &[[f64; 2]],
+    constraints: &Constraints,
+    set: &mut [u32],
+    parts: usize,
+    leaves: &mut Vec<Vec<u32>>,
+) {
     if parts == 1 {
         let mut leaf = set.to_vec();
         leaf.sort_unstable();
@@ -110,13 +191,27 @@ fn split_set(points: &[[f64; 2]], set: &mut [u32], parts: usize, leaves: &mut Ve
     let axis = longer_side(points, set);
     let left_parts = parts / 2;
     let left = (set.len() as u64 * left_parts as u64 / parts as u64) as usize;
+    let first =
+        |v: u32| constraints.bodies.of(v).map_or(v, |body| constraints.bodies.as_slice()[body].members[0]);
     // Ties are broken by the canonical index, so the cut is the same on any machine.
-    set.select_nth_unstable_by(left, |&a, &b| {
-        points[a as usize][axis].total_cmp(&points[b as usize][axis]).then(a.cmp(&b))
-    });
+    let order = |a: &u32, b: &u32| {
+        let (p, q) = (first(*a), first(*b));
+        points[p as usize][axis].total_cmp(&points[q as usize][axis]).then(p.cmp(&q)).then(a.cmp(b))
+    };
+    set.select_nth_unstable_by(left, order);
+    // A body is one run in this order: cut before or after the one at the cut, whichever is nearer.
+    let cut = first(set[left]);
+    let below = set[..left].iter().filter(|&&v| first(v) == cut).count();
+    let above = set[left..].iter().filter(|&&v| first(v) == cut).count();
+    let left = match (below, above) {
+        (0, _) => left,
+        (below, above) if below > above && left + above < set.len() => left + above,
+        (below, _) => left - below,
+    };
+    set.select_nth_unstable_by(left, order);
     let (lower, upper) = set.split_at_mut(left);
-    split_set(points, lower, left_parts, leaves);
-    split_set(points, upper, parts - left_parts, leaves);
+    split_set(points, constraints, lower, left_parts, leaves);
+    split_set(points, constraints, upper, parts - left_parts, leaves);
 }
 
 fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
@@ -128,24 +223,96 @@ fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
     usize::from(extent(1) > extent(0))
 }
 
-/// Gives every leaf the mesh edges whose two ends are in it.
-fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], vertices: usize) -> Vec<Patch> {
-    let mut place = vec![[0u32; 2]; vertices]; // patch, position in it
-    for (patch, leaf) in leaves.iter().enumerate() {
-        for (position, &v) in leaf.iter().enumerate() {
-            place[v as usize] = [patch as u32, position as u32];
+/// Where a vertex is: its patch and its position in it.
+#[derive(Clone, Copy)]
+struct Place {
+    patch: u32,
+    row: u32,
+}
+
+impl Place {
+    fn of_all(leaves: &[Vec<u32>], vertices: usize) -> Vec<Place> {
+        let mut places = vec![Place { patch: 0, row: 0 }; vertices];
+        for (patch, leaf) in leaves.iter().enumerate() {
+            for (row, &v) in leaf.iter().enumerate() {
+                places[v as usize] = Place { patch: patch as u32, row: row as u32 };
+            }
         }
+        places
     }
-    let patch = |vertices: Vec<u32>| Patch { edges: Vec::with_capacity(3 * vertices.len()), vertices };
+}
+
+/// Gives every leaf the mesh edges whose two ends are in it.
+fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[Place]) -> Vec<Patch> {
+    let patch = |vertices: Vec<u32>| Patch {
+        edges: Vec::with_capacity(3 * vertices.len()),
+        vertices,
+        ..Patch::default()
+    };
     let mut patches: Vec<Patch> = leaves.into_iter().map(patch).collect();
     // Edges come sorted by canonical index and positions ascend with it, so each list stays sorted.
-    for [a, b] in edges {
-        let ([patch_a, i], [patch_b, j]) = (place[*a as usize], place[*b as usize]);
-        if patch_a == patch_b {
-            patches[patch_a as usize].edges.push([i, j]);
+    for edge in edges {
+        let [a, b] = edge.map(|v| places[v as usize]);
+        if a.patch == b.patch {
+            patches[a.patch as usize].edges.push([a.row, b.row]);
         }
     }
     patches
+}
+
+/// Gives every patch the constraints on its vertices.
+fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[Place]) {
+    for hanging in constraints.junctions.hanging() {
+        let Place { patch, row } = places[hanging.vertex as usize];
+        let position = |&(anchor, weight): &(u32, f64)| match places[anchor as usize] {
+            place if place.patch == patch => Some((place.row, weight)),
+            _ => None,
+        };
+        let anchors = hanging.anchors.iter().map(position).collect::<Option<_>>().unwrap_or_default();
+        patches[patch as usize].hanging.push(HangingRow { row, anchors });
+    }
+    for body in constraints.bodies.as_slice() {
+        let rows = body.members.iter().map(|&v| places[v as usize].row).collect();
+        let patch = places[body.members[0] as usize].patch;
+        patches[patch as usize].bodies.push(BodyRows { rows, arms_m: body.arms_m.clone() });
+    }
+}
+
+/// A triangle flatter than this (height over base, about) counts as so flat: cotangents stay finite.
+const LEAST_HEIGHT: f64 = 0.01;
+
+/// Weighs the edges of every patch by the cotangents of the angles that face them in the triangles of the mesh with
+/// all three corners in the patch, cot α + cot β; edges of no such triangle, bridges among them, by 1.
+fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points: &[[f64; 2]]) {
+    let mut of_patch: Vec<Vec<[u32; 3]>> = vec![Vec::new(); patches.len()];
+    for triangle in triangles {
+        let corners = triangle.map(|v| places[v as usize]);
+        if corners.iter().all(|corner| corner.patch == corners[0].patch) {
+            of_patch[corners[0].patch as usize].push(corners.map(|corner| corner.row));
+        }
+    }
+    patches.par_iter_mut().zip(of_patch).for_each(|(patch, triangles)| {
+        let mut weights = vec![None; patch.edges.len()];
+        for triangle in triangles {
+            let at = triangle.map(|row| points[patch.vertices[row as usize] as usize]);
+            for corner in 0..3 {
+                let (a, b) = (triangle[(corner + 1) % 3], triangle[(corner + 2) % 3]);
+                let edge =
+                    patch.edges.binary_search(&[a.min(b), a.max(b)]).expect("a triangle has mesh edges");
+                *weights[edge].get_or_insert(0.0) += cotangent(at, corner);
+            }
+        }
+        patch.weights = weights.into_iter().map(|weight| weight.unwrap_or(1.0)).collect();
+    });
+}
+
+/// The cotangent of a triangle's angle at a corner. Of a flat triangle all three are made smaller alike, so that
+/// its energy stays positive.
+fn cotangent(at: [[f64; 2]; 3], corner: usize) -> f64 {
+    let side = |from: usize, to: usize| [at[to][0] - at[from][0], at[to][1] - at[from][1]];
+    let (u, v) = (side(corner, (corner + 1) % 3), side(corner, (corner + 2) % 3));
+    let longest2 = (0..3).map(|i| dot(side(i, (i + 1) % 3), side(i, (i + 1) % 3))).fold(0.0, f64::max);
+    dot(u, v) / cross(u, v).abs().max(LEAST_HEIGHT * longest2)
 }
 
 /// The component number of every vertex of a patch, and how many components there are.
@@ -206,6 +373,7 @@ fn bridge(patch: &mut Patch, points: &[[f64; 2]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{ground::Ground, vertices::VertexTable};
 
     const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 
@@ -215,10 +383,14 @@ mod tests {
         VertexTable::new(coords).unwrap()
     }
 
+    fn size(patch_size: usize) -> Parameters {
+        Parameters { patch_size, ..Parameters::default() }
+    }
+
     #[test]
     fn every_patch_has_nearly_patch_size_vertices() {
         for (n, d, patches) in [(5000, 480, 10), (959, 480, 1), (960, 480, 2), (4000, 100, 40)] {
-            let cut = Patches::new(&scattered(n), &METRES, d).unwrap();
+            let cut = Patches::new(&Map::of_points(&scattered(n), METRES), &size(d)).unwrap();
             cut.validate().unwrap();
             assert_eq!(cut.as_slice().len(), patches);
             for patch in cut.as_slice() {
@@ -229,14 +401,14 @@ mod tests {
 
     #[test]
     fn too_few_vertices_name_the_size_that_fits() {
-        let error = Patches::new(&scattered(300), &METRES, 480).unwrap_err();
+        let error = Patches::new(&Map::of_points(&scattered(300), METRES), &size(480)).unwrap_err();
         assert!(error.to_string().contains("300 distinct vertices"), "{error}");
         assert!(error.to_string().contains("PATCH_SIZE=300 or less"), "{error}");
     }
 
     #[test]
     fn capacity_counts_the_mean_as_taken() {
-        let cut = Patches::new(&scattered(600), &METRES, 300).unwrap();
+        let cut = Patches::new(&Map::of_points(&scattered(600), METRES), &size(300)).unwrap();
         let p = Parameters { chip_rate: 1, ..Parameters::default() };
         assert_eq!(cut.carriers(299, &p), Ok(299));
         assert!(cut.carriers(300, &p).unwrap_err().to_string().contains("has 299"));
@@ -245,7 +417,7 @@ mod tests {
     #[test]
     fn pieces_are_bridged_by_their_shortest_edges() {
         let points = [[0.0, 0.0], [1.0, 0.0], [5.0, 0.0], [6.0, 0.0], [5.5, 3.0]];
-        let mut patch = Patch { vertices: (0..5).collect(), edges: vec![[0, 1], [2, 3]] };
+        let mut patch = Patch { vertices: (0..5).collect(), edges: vec![[0, 1], [2, 3]], ..Patch::default() };
         bridge(&mut patch, &points);
         assert_eq!(patch.edges, [[0, 1], [1, 2], [2, 3], [2, 4]]);
     }

@@ -5,7 +5,7 @@ use crate::{
     code::Code,
     embedding::Displacement,
     message::Message,
-    options::{Parameters, Subject},
+    options::{Laplacian, Parameters, Shape, Subject},
 };
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +37,10 @@ pub struct Record {
     pub patch_size: usize,
     /// No vertex moved further.
     pub tolerance_m: f64,
+    /// What moved as one.
+    pub shape: Shape,
+    /// Which functions carry the mark.
+    pub basis: Laplacian,
     /// Output grid in CRS units.
     pub precision_crs_units: Option<f64>,
     /// Layers that were marked; all when null.
@@ -47,6 +51,8 @@ pub struct Record {
     pub reference: Reference,
     /// How far its vertices moved.
     pub displacement: DisplacementEntry,
+    /// What keeping the topology took.
+    pub topology: TopologyEntry,
 }
 
 /// What a record says about the reference map.
@@ -73,6 +79,16 @@ pub struct DisplacementEntry {
     pub p99_m: f64,
     /// The largest.
     pub max_m: f64,
+}
+
+/// What a record says about the topology of the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TopologyEntry {
+    /// Vertices that lie on segments of other features and moved with them.
+    pub t_junctions: usize,
+    /// Vertices that moved otherwise than the mark wanted, so that nothing crosses that did not.
+    pub attenuated_vertices: usize,
 }
 
 impl From<Displacement> for DisplacementEntry {
@@ -110,6 +126,8 @@ impl Record {
     /// [`Error::Record`] when one of them is out of range.
     pub fn parameters(&self) -> Result<Parameters> {
         let values = [
+            ("SHAPE", self.shape.name().into()),
+            ("BASIS", self.basis.name().into()),
             ("CODE", self.code.name()),
             ("AMPLITUDE", self.amplitude_m.to_string()),
             ("CHIP_RATE", self.chip_rate.to_string()),

@@ -15,18 +15,20 @@ use rand_chacha::{
 /// by the solver.
 const EQUAL_EIGENVALUES: f64 = 1e-8;
 
-/// The first eigenvectors of the Biggs Laplacian R = I − D⁻¹A of a patch.
+/// The first eigenvectors of the Laplacian of a patch.
 ///
-/// R is not symmetric. With L = I − D^−½ A D^−½ = U Λ Uᵀ, its eigenvectors are w_i = D^−½ u_i and
+/// The Biggs Laplacian R = I − D⁻¹A is not symmetric. With L = I − D^−½ A D^−½ = U Λ Uᵀ, its eigenvectors are w_i = D^−½ u_i and
 /// the basis is e_i = w_i / |w_i|. E is not orthogonal; analysis uses its dual, whose row i is
 /// |w_i| u_iᵀ D^½ = |w_i|² e_iᵀ D.
+///
+/// The cotangent Laplacian is symmetric: the same holds with D = I.
 #[derive(Debug, Clone)]
 pub struct Basis {
     /// n × k, column i = e_i, |e_i| = 1; column 0 is the constant one (eigenvalue 0).
     pub vectors: Mat<f64>,
-    /// k eigenvalues, ascending, in [0, 2].
+    /// k eigenvalues, ascending, those of Biggs in [0, 2], cotangent ones as shares of the largest diagonal entry.
     pub eigenvalues: Vec<f64>,
-    /// n vertex degrees, the diagonal of D.
+    /// n vertex degrees, the diagonal of D; 1 each with the cotangent Laplacian.
     pub degrees: Vec<f64>,
     /// k values |w_i|².
     pub norms_squared: Vec<f64>,
@@ -51,7 +53,10 @@ impl Basis {
         solver: impl Fn(Mat<f64>, usize) -> Option<(Vec<f64>, Mat<f64>)>,
     ) -> Result<Self> {
         let n = patch.vertices.len();
-        let (laplacian, degrees) = symmetric_laplacian(patch);
+        let (laplacian, degrees) = match patch.weights.is_empty() {
+            true => symmetric_laplacian(patch),
+            false => (cotangent_laplacian(patch), vec![1.0; n]),
+        };
         let (values, mut vectors) = solver(laplacian, count).ok_or(Error::NoConvergence { vertices: n })?;
         canonicalise(&values[..end_of_group(&values, count)], &mut vectors);
         vectors.truncate(n, count);
@@ -90,6 +95,23 @@ fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
         laplacian[(b, a)] = weight;
     }
     (laplacian, degrees)
+}
+
+/// The Dirichlet Laplacian of a patch (n × n), −(cot α + cot β) off the diagonal and rows that sum to 0 (U. Pinkall,
+/// K. Polthier, *Computing discrete minimal surfaces and their conjugates*, Exp. Math. 2, 1993), divided by its
+/// largest diagonal entry: which eigenvalues are equal must not depend on the unit of the map.
+fn cotangent_laplacian(patch: &Patch) -> Mat<f64> {
+    let n = patch.vertices.len();
+    let mut laplacian = Mat::zeros(n, n);
+    for ([a, b], weight) in patch.edges.iter().zip(&patch.weights) {
+        let (a, b) = (*a as usize, *b as usize);
+        laplacian[(a, b)] = -weight;
+        laplacian[(b, a)] = -weight;
+        laplacian[(a, a)] += weight;
+        laplacian[(b, b)] += weight;
+    }
+    let largest = (0..n).map(|v| laplacian[(v, v)]).fold(f64::MIN_POSITIVE, f64::max);
+    laplacian / faer::Scale(largest)
 }
 
 /// The lowest eigenvalues and eigenvectors of a symmetric matrix, as [`Basis::with_solver`] needs them:

@@ -9,8 +9,10 @@ use meshmark_core::{
     embedding::embed,
     ground::Ground,
     key::SecretKey,
+    map::Map,
+    mesh::Mesh,
     message::Message,
-    options::Parameters,
+    options::{Laplacian, Parameters},
     patches::{Patch, Patches},
     spectrum::Basis,
     vertices::VertexTable,
@@ -37,7 +39,7 @@ fn vertices() -> impl Strategy<Value = Vec<[f64; 2]>> {
 
 fn marked(table: &VertexTable, ground: &Ground, parameters: &Parameters) -> Vec<[f64; 2]> {
     let message = Message::from_hex(MESSAGE).unwrap();
-    embed(table, ground, &key(), &message, parameters).unwrap().coords
+    embed(&Map::of_points(table, *ground), &key(), &message, parameters).unwrap().coords
 }
 
 fn observed(table: &VertexTable, ground: &Ground, moved: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
@@ -50,7 +52,7 @@ fn read_back(
     observed: &[Option<[f64; 2]>],
     p: &Parameters,
 ) -> [Demodulation; 2] {
-    let patches = Patches::new(table, ground, p.patch_size).unwrap();
+    let patches = Patches::new(&Map::of_points(table, *ground), p).unwrap();
     patches.validate().unwrap();
     let carrier = Carrier::new(&key());
     let disturbance = Deformation::estimate(&patches, observed, 128, p).unwrap().predict(
@@ -76,12 +78,12 @@ proptest! {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { patch_size: 290, chip_rate: 1, code: Code::Ldpc, ..Parameters::default() };
         let message = Message::from_bytes(&bytes);
-        let moved = embed(&table, &METRES, &key(), &message, &p).unwrap().coords;
+        let moved = embed(&Map::of_points(&table, METRES), &key(), &message, &p).unwrap().coords;
         let mut seen = observed(&table, &METRES, &moved);
         for displacement in seen.iter_mut().step_by(6) {
             *displacement = None;
         }
-        let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         let disturbance = Deformation::none(0.02).predict(&patches, &seen, 256, p.amplitude_m);
         let found = demodulation::joint(
             &patches, &Carrier::new(&key()), &seen, 128, &p, &disturbance, &|_| ()).unwrap();
@@ -94,9 +96,11 @@ proptest! {
     fn analysis_after_synthesis_is_the_identity(
         points in vertices(),
         seed in prop::collection::vec(-1.0..1.0f64, 500),
+        laplacian in prop_oneof![Just(Laplacian::Biggs), Just(Laplacian::Cotangent)],
     ) {
         let table = VertexTable::new(points).unwrap();
-        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        let p = Parameters { laplacian, ..small() };
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         for patch in patches.as_slice() {
             let n = patch.vertices.len();
             let basis = Basis::low_frequencies(patch, n).unwrap();
@@ -107,9 +111,29 @@ proptest! {
     }
 
     #[test]
+    fn eigenvectors_satisfy_the_cotangent_laplacian(points in vertices()) {
+        let table = VertexTable::new(points).unwrap();
+        let p = Parameters { laplacian: Laplacian::Cotangent, patch_size: table.len(), ..small() };
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+        let basis = Basis::low_frequencies(&patches.as_slice()[0], 100).unwrap();
+        let mesh = Mesh::delaunay(&table.local(1.0)).unwrap();
+        let stiffness = stiffness(table.coords(), mesh.triangles());
+        let largest = (0..table.len()).map(|v| stiffness[(v, v)]).fold(0.0, f64::max);
+        let image = &stiffness * &basis.vectors;
+        for i in 0..100 {
+            for v in 0..table.len() {
+                let expected = largest * basis.eigenvalues[i] * basis.vectors[(v, i)];
+                prop_assert!((image[(v, i)] - expected).abs() < 1e-9 * largest);
+            }
+        }
+        let gram = basis.vectors.transpose() * &basis.vectors;
+        prop_assert!((gram - Mat::<f64>::identity(100, 100)).norm_max() < 1e-9);
+    }
+
+    #[test]
     fn eigenvectors_satisfy_the_biggs_laplacian(points in vertices()) {
         let table = VertexTable::new(points).unwrap();
-        let patches = Patches::new(&table, &METRES, 150).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
         let patch = &patches.as_slice()[0];
         let basis = Basis::low_frequencies(patch, 100).unwrap();
         for i in 0..100 {
@@ -216,6 +240,26 @@ fn clusters() -> VertexTable {
     VertexTable::new(coords).unwrap()
 }
 
+/// The stiffness matrix of linear finite elements: the sides a and b of a triangle that face two of its corners make
+/// an entry a·b / 4A. Triangles flatter than 1 : 100 are as stiff as those.
+fn stiffness(coords: &[[f64; 2]], triangles: &[[u32; 3]]) -> Mat<f64> {
+    let mut matrix = Mat::zeros(coords.len(), coords.len());
+    for triangle in triangles {
+        let at = triangle.map(|v| coords[v as usize]);
+        let side = |i: usize| [0, 1].map(|axis| at[(i + 2) % 3][axis] - at[(i + 1) % 3][axis]);
+        let product = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let ([ax, ay], [bx, by]) = (side(0), side(1));
+        let longest2 = (0..3).map(|i| product(side(i), side(i))).fold(0.0, f64::max);
+        let area2 = (ax * by - ay * bx).abs().max(0.01 * longest2);
+        for i in 0..3 {
+            for j in 0..3 {
+                matrix[(triangle[i] as usize, triangle[j] as usize)] += product(side(i), side(j)) / area2;
+            }
+        }
+    }
+    matrix
+}
+
 fn by_nalgebra(matrix: Mat<f64>, _: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = matrix.nrows();
     let solved = nalgebra::DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]).symmetric_eigen();
@@ -235,9 +279,11 @@ fn largest_difference(patch: &Patch, count: usize) -> f64 {
 #[test]
 fn another_solver_gives_the_same_basis_on_grids_and_on_patches_that_fall_apart() {
     for table in [grid(20), grid(25), clusters()] {
-        let patches = Patches::new(&table, &METRES, 150).unwrap();
-        for patch in patches.as_slice() {
-            assert!(largest_difference(patch, 129) < 1e-6);
+        for laplacian in [Laplacian::Biggs, Laplacian::Cotangent] {
+            let p = Parameters { laplacian, ..small() };
+            for patch in Patches::new(&Map::of_points(&table, METRES), &p).unwrap().as_slice() {
+                assert!(largest_difference(patch, 129) < 1e-6, "{laplacian:?}");
+            }
         }
     }
 }
@@ -256,7 +302,7 @@ fn a_complete_grid_patch_has_repeated_eigenvalues_and_still_one_basis() {
         }
     }
     edges.sort_unstable();
-    let patch = Patch { vertices: (0..side * side).collect(), edges };
+    let patch = Patch { vertices: (0..side * side).collect(), edges, ..Patch::default() };
     let values = Basis::low_frequencies(&patch, 100).unwrap().eigenvalues;
     assert!(values.windows(2).filter(|w| w[1] - w[0] < 1e-8).count() > 20, "no repeated eigenvalues");
     for count in [99, 100, 101] {
@@ -274,7 +320,7 @@ fn another_solver_gives_the_same_basis_on_paths_cycles_stars_and_complete_graphs
     let star = (1..n).map(|i| [0, i]).collect();
     let complete = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).collect();
     for edges in [path, cycle, star, complete] {
-        let patch = Patch { vertices: (0..n).collect(), edges };
+        let patch = Patch { vertices: (0..n).collect(), edges, ..Patch::default() };
         for count in [2, 31, 32, 60] {
             assert!(largest_difference(&patch, count) < 1e-9, "{count}");
         }
@@ -286,7 +332,7 @@ fn a_mark_made_with_one_solver_is_read_with_another() {
     for table in [grid(20), clusters()] {
         let p = small();
         let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-        let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         let mut scores = vec![0.0; 64];
         for (number, patch) in patches.as_slice().iter().enumerate() {
             let basis = Basis::with_solver(patch, 129, by_nalgebra).unwrap();
@@ -308,7 +354,7 @@ fn decoy_keys_score_like_a_standard_normal_on_a_marked_map() {
     let table = grid(25);
     let p = small();
     let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-    let patches = Patches::new(&table, &METRES, p.patch_size).unwrap();
+    let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
     let message = Message::from_hex(MESSAGE).unwrap();
     let score = |seed: u8| {
         let carrier = Carrier::new(&SecretKey::from_bytes([seed; 32]));

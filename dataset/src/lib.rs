@@ -6,6 +6,7 @@
 mod assumption;
 mod crs;
 mod error;
+mod features;
 mod labels;
 mod shapes;
 mod survey;
@@ -14,6 +15,7 @@ pub mod wkb;
 pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
+pub use features::{FeatureGeometry, features};
 pub use labels::{Dimension, Label};
 pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.

@@ -8,7 +8,7 @@ use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
-use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_core::{ground::Ground, map::Map, vertices::VertexTable};
 
 /// Which attributes become labels. With labels come shapes: both are for registration.
 #[derive(Debug, Clone, Copy)]
@@ -67,6 +67,8 @@ pub struct Survey {
     pub vertices: VertexTable,
     /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
     pub segments: Vec<[u32; 2]>,
+    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
+    pub polygons: Vec<u32>,
     /// Its CRS: the common one of its layers, or the one it was reprojected into.
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and could be in degrees.
@@ -98,6 +100,9 @@ impl Survey {
             .collect();
         segments.sort_unstable();
         segments.dedup();
+        let mut joined = Joined::none(vertices.len());
+        indices.iter().zip(&self.polygons).for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
+        let polygons = joined.firsts();
         let places = bring(self.labels.iter().map(|label| label.point).collect())?;
         let in_shapes = bring(self.shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect())?;
         let (mut labels, mut shapes) = (self.labels.clone(), self.shapes.clone());
@@ -105,7 +110,7 @@ impl Survey {
         let of_shapes = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
         of_shapes.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
         let ground = Some(crs::ground(Some(crs), &vertices)?);
-        Ok(Survey { vertices, segments, crs: Some(crs.clone()), ground, labels, shapes })
+        Ok(Survey { vertices, segments, polygons, crs: Some(crs.clone()), ground, labels, shapes })
     }
 
     /// Metres on the ground.
@@ -114,6 +119,15 @@ impl Survey {
     /// [`Error::NoCrs`].
     pub fn ground(&self) -> Result<Ground> {
         self.ground.ok_or(Error::NoCrs)
+    }
+
+    /// The map as the algorithm sees it.
+    ///
+    /// # Errors
+    /// [`Error::NoCrs`].
+    pub fn map(&self) -> Result<Map<'_>> {
+        let Survey { vertices, segments, polygons, .. } = self;
+        Ok(Map { vertices, segments, polygons, ground: self.ground()? })
     }
 }
 
@@ -133,18 +147,20 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Target::Crs(target) => Some(target.clone()),
         Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
-    let (vertices, indices) = VertexTable::indexed(walk.chains.coords)?;
-    let segments = segments(&indices, &walk.chains.starts);
+    let Chains { coords, starts, kinds } = walk.chains;
+    let (vertices, indices) = VertexTable::indexed(coords)?;
+    let segments = segments(&indices, &starts);
+    let polygons = polygons(&indices, &starts, &kinds, vertices.len());
     let ground = match crs::ground(crs.as_ref(), &vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
-    Ok(Survey { vertices, segments, crs, ground, labels: walk.labels, shapes: walk.shapes })
+    Ok(Survey { vertices, segments, polygons, crs, ground, labels: walk.labels, shapes: walk.shapes })
 }
 
 /// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
-fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
+pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
     let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
     if known.is_empty() {
         return Err(Error::NoLayers);
@@ -162,12 +178,15 @@ struct Chains {
     coords: Vec<[f64; 2]>,
     /// Where in `coords` each of them starts, ascending.
     starts: Vec<u32>,
+    /// What each of them is.
+    kinds: Vec<Step>,
 }
 
 impl Chains {
     fn push(&mut self, step: Step, point: [f64; 2]) {
-        if step == Step::First {
+        if step != Step::Next {
             self.starts.push(self.coords.len() as u32);
+            self.kinds.push(step);
         }
         self.coords.push(point);
     }
@@ -176,6 +195,7 @@ impl Chains {
         let offset = self.coords.len() as u32;
         self.starts.extend(other.starts.drain(..).map(|start| start + offset));
         self.coords.append(&mut other.coords);
+        self.kinds.append(&mut other.kinds);
     }
 }
 
@@ -192,6 +212,48 @@ fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
     segments.dedup();
     segments.shrink_to_fit();
     segments
+}
+
+/// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
+fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) -> Vec<u32> {
+    let mut joined = Joined::none(vertices);
+    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
+    let mut shell = 0;
+    for ((&start, end), kind) in starts.iter().zip(ends).zip(kinds) {
+        match kind {
+            Step::Shell => shell = indices[start as usize],
+            Step::Hole => {}
+            Step::First | Step::Next => continue,
+        }
+        indices[start as usize..end].iter().for_each(|&v| joined.join(v, shell));
+    }
+    joined.firsts()
+}
+
+/// Sets of vertices, each known by its first one (union-find).
+struct Joined(Vec<u32>);
+
+impl Joined {
+    fn none(vertices: usize) -> Self {
+        Joined((0..vertices as u32).collect())
+    }
+
+    fn root(&mut self, mut v: u32) -> u32 {
+        while self.0[v as usize] != v {
+            self.0[v as usize] = self.0[self.0[v as usize] as usize];
+            v = self.0[v as usize];
+        }
+        v
+    }
+
+    fn join(&mut self, v: u32, w: u32) {
+        let (a, b) = (self.root(v), self.root(w));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+
+    fn firsts(mut self) -> Vec<u32> {
+        (0..self.0.len() as u32).map(|v| self.root(v)).collect()
+    }
 }
 
 struct Walk<'a> {
@@ -386,5 +448,13 @@ mod tests {
             let map = survey(&dataset, &selection).unwrap();
             assert_eq!(map.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }
+    }
+
+    #[test]
+    fn polygons_are_joined_by_shared_vertices_and_to_their_holes_but_not_by_lines() {
+        // A polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to 8, a polygon 9 10 11.
+        let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
+        let kinds = [Step::Shell, Step::Hole, Step::Shell, Step::First, Step::Shell];
+        assert_eq!(polygons(&indices, &[0, 4, 8, 12, 14], &kinds, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
     }
 }

@@ -18,8 +18,12 @@ const MOST_NESTED: usize = 64;
 /// Whether a coordinate pair begins a sequence (ring, line, point) or is joined to the one before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// The first pair of a sequence.
+    /// The first pair of a line, or a point.
     First,
+    /// The first pair of a polygon's first ring.
+    Shell,
+    /// The first pair of a further ring of the same polygon.
+    Hole,
     /// A segment leads here from the pair before. Arcs count as the chords of their control points.
     Next,
 }
@@ -65,11 +69,11 @@ impl Cursor<'_> {
         let layout = Layout { little_endian, ordinates };
         match kind {
             1 => self.point(&layout, f, Step::First, true),
-            2 | 8 => self.sequence(&layout, f), // LineString, CircularString
+            2 | 8 => self.sequence(&layout, f, Step::First), // LineString, CircularString
             3 | 17 => {
                 // Polygon, Triangle
-                for _ in 0..self.count(little_endian)? {
-                    self.sequence(&layout, f)?;
+                for ring in 0..self.count(little_endian)? {
+                    self.sequence(&layout, f, if ring == 0 { Step::Shell } else { Step::Hole })?;
                 }
                 Ok(())
             }
@@ -88,9 +92,10 @@ impl Cursor<'_> {
         &mut self,
         layout: &Layout,
         f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
+        first: Step,
     ) -> Result<(), E> {
         for place in 0..self.count(layout.little_endian)? {
-            let step = if place == 0 { Step::First } else { Step::Next };
+            let step = if place == 0 { first } else { Step::Next };
             self.point(layout, f, step, false)?;
         }
         Ok(())

@@ -7,6 +7,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::{Mat, Par, Side};
 use gdal::Dataset;
 use meshmark_core::{
+    options::Parameters,
     patches::{Patch, Patches},
     spectrum::Basis,
 };
@@ -57,8 +58,9 @@ fn first_patch(patch_size: usize) -> Patch {
         last_failure: &|| None,
     };
     let map = survey(&Dataset::open(MAP).expect("the fixture opens"), &selection).expect("and is a map");
-    let ground = map.ground().expect("with metres");
-    let patches = Patches::new(&map.vertices, &ground, patch_size).expect("of enough vertices");
+    let parameters = Parameters { patch_size, ..Parameters::default() };
+    let map = map.map().expect("with metres");
+    let patches = Patches::new(&map, &parameters).expect("of enough vertices");
     patches.as_slice()[0].clone()
 }
 

@@ -102,13 +102,13 @@ impl Marking {
     /// When it cannot be marked.
     pub fn new() -> Self {
         let map = read(&reference_path());
-        let ground = map.ground().expect("a projected CRS");
-        let reference = map.vertices;
+        let on_ground = map.map().expect("a projected CRS");
+        let ground = on_ground.ground;
         let parameters = Parameters::default();
         let message = key().recipient_message(RECIPIENT);
-        let marked = embed(&reference, &ground, &key(), &message, &parameters).expect("it fits");
-        let patches = Patches::new(&reference, &ground, parameters.patch_size).expect("it fits");
-        Marking { reference, ground, parameters, message, marked, patches }
+        let marked = embed(&on_ground, &key(), &message, &parameters).expect("it fits");
+        let patches = Patches::new(&on_ground, &parameters).expect("it fits");
+        Marking { reference: map.vertices, ground, parameters, message, marked, patches }
     }
 
     /// Every intermediate value an implementer may want to compare, by the steps of the algorithm.
@@ -239,7 +239,7 @@ fn column(basis: &Basis, i: usize) -> Vec<f64> {
 fn ring() -> Value {
     let mut edges: Vec<[u32; 2]> = (0..11).map(|i| [i, i + 1]).chain([[0, 11]]).collect();
     edges.sort_unstable();
-    let patch = Patch { vertices: (0..12).collect(), edges };
+    let patch = Patch { vertices: (0..12).collect(), edges, ..Patch::default() };
     let basis = Basis::low_frequencies(&patch, 5).expect("it converges");
     json!({
         "edges": patch.edges,

@@ -72,7 +72,7 @@ fn the_message_can_be_read_from_what_ogr2ogr_wrote() {
 
     let reference = survey_of(&fixture("kotka.gpkg"));
     let (table, ground) = (&reference.vertices, reference.ground().unwrap());
-    let patches = Patches::new(table, &ground, record.patch_size).unwrap();
+    let patches = Patches::new(&reference.map().unwrap(), &record.parameters().unwrap()).unwrap();
     let mut observed = vec![None; table.len()];
     for (from, to) in moves {
         observed[table.index_of(from).unwrap()] = Some(ground.metres_between(from, to));

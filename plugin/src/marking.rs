@@ -10,13 +10,11 @@ use meshmark_core::{
     carrier::Carrier,
     demodulation,
     embedding::{self, Marked},
-    ground::Ground,
     key::SecretKey,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Subject},
     patches::Patches,
-    record::{self, Record, Reference},
-    vertices::VertexTable,
+    record::{self, Record, Reference, TopologyEntry},
 };
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey, wkb};
 use std::{fs::File, io::Read, path::Path};
@@ -108,9 +106,8 @@ pub struct Source<'a> {
 pub struct Marking {
     /// What to call the source in messages.
     pub name: String,
-    table: VertexTable,
+    map: Survey,
     moved: Vec<[f64; 2]>,
-    ground: Ground,
     layers: Option<Vec<String>>,
     files: SourceFiles,
     /// The text of its record.
@@ -127,18 +124,16 @@ impl Marking {
         output::check_is_not_source(&source.files)?;
         let map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
-        let ground = map.ground()?;
+        let on_ground = map.map()?;
         let message = request.subject.message(&request.key);
-        let marked = pool(threads)?.install(|| {
-            embedding::embed(&map.vertices, &ground, &request.key, &message, &options.parameters)
-        })?;
+        let marked = pool(threads)?
+            .install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
         let record = record(request, &map, &marked).to_json();
         let warnings = warnings(&options.parameters, &message, &map, &marked);
         Ok(Marking {
             name: source.name,
-            table: map.vertices,
+            map,
             moved: marked.coords,
-            ground,
             record,
             layers: options.layers.clone(),
             files: source.files,
@@ -157,11 +152,11 @@ impl Marking {
     pub fn check_message(&self, request: &Request, found: &[[f64; 2]], threads: usize) -> Result<()> {
         let parameters = &request.options.parameters;
         let message = request.subject.message(&request.key);
-        let pairs = self.table.coords().iter().zip(found);
-        let observed: Vec<_> = pairs.map(|(a, b)| Some(self.ground.metres_between(*a, *b))).collect();
-        let (table, ground) = (&self.table, &self.ground);
+        let map = self.map.map()?;
+        let pairs = map.vertices.coords().iter().zip(found);
+        let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();
         let demodulated = pool(threads)?.install(|| {
-            let patches = Patches::new(table, ground, parameters.patch_size)?;
+            let patches = Patches::new(&map, parameters)?;
             let carrier = Carrier::new(&request.key);
             demodulation::paper(&patches, &carrier, &observed, message.len(), parameters, &|_| ())
         })?;
@@ -186,7 +181,7 @@ impl Marking {
         let mut count = 0;
         wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
             count += 1;
-            let index = self.table.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
+            let index = self.map.vertices.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
             Ok(self.moved[index])
         })?;
         Ok(count)
@@ -194,7 +189,7 @@ impl Marking {
 
     /// The furthest any vertex moved along x and y, CRS units.
     pub fn reach(&self) -> [f64; 2] {
-        let moves = self.table.coords().iter().zip(&self.moved);
+        let moves = self.map.vertices.coords().iter().zip(&self.moved);
         moves.fold([0.0; 2], |reach: [f64; 2], (from, to)| {
             [0, 1].map(|axis| reach[axis].max((to[axis] - from[axis]).abs()))
         })
@@ -285,6 +280,8 @@ fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
         chip_rate: parameters.chip_rate,
         patch_size: parameters.patch_size,
         tolerance_m: parameters.tolerance_m,
+        shape: parameters.shape,
+        basis: parameters.laplacian,
         precision_crs_units: parameters.precision,
         layers: options.layers.clone(),
         srs: options.srs.clone(),
@@ -295,5 +292,6 @@ fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
             crs: map.crs.as_ref().map(|crs| crs.label()),
         },
         displacement: marked.displacement.into(),
+        topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
     }
 }

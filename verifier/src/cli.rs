@@ -8,8 +8,8 @@ use meshmark_core::{
     record::Record,
 };
 use meshmark_verifier::{
-    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, explain::Inputs,
-    progress::Progress, reading, registration::Start, verify, verify::check_key,
+    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::compare,
+    explain::Inputs, progress::Progress, reading, registration::Start, verify, verify::check_key,
 };
 use std::{io::Write, path::PathBuf};
 
@@ -37,6 +37,25 @@ enum Subcommands {
     /// Exit codes: 0 match, 1 no match, 2 usage, 3 inconclusive, 4 the record does not belong to this
     /// reference or key, 5 unreadable input, 6 too large.
     Verify(Box<VerifyArgs>),
+    /// Say what marking did to a map: displacement, angles, areas, topology
+    ///
+    /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
+    /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large.
+    Compare(CompareArgs),
+}
+
+#[derive(Args)]
+struct CompareArgs {
+    /// The map as it was before marking
+    reference: PathBuf,
+    /// The marked map
+    marked: PathBuf,
+    /// Comma-separated layers to compare; all by default
+    #[arg(long, value_delimiter = ',')]
+    layers: Vec<String>,
+    /// Print the comparison as one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
@@ -137,6 +156,7 @@ pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Subcommands::Keygen { key_file } => keygen(&key_file),
         Subcommands::Verify(args) => run_verify(*args),
+        Subcommands::Compare(args) => run_compare(&args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("meshmark: {error}");
@@ -167,6 +187,13 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
         return Err(failed(error));
     }
     println!("key {} written to {}", key.id(), path.display());
+    Ok(ExitCode::Match)
+}
+
+fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
+    let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
+    let comparison = compare(&args.reference, &args.marked, layers)?;
+    print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
     Ok(ExitCode::Match)
 }
 
@@ -249,6 +276,8 @@ fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> 
             "CHIP_RATE" => alone.parameters.chip_rate == recorded.parameters.chip_rate,
             "PATCH_SIZE" => alone.parameters.patch_size == recorded.parameters.patch_size,
             "TOLERANCE" => alone.parameters.tolerance_m == recorded.parameters.tolerance_m,
+            "SHAPE" => alone.parameters.shape == recorded.parameters.shape,
+            "BASIS" => alone.parameters.laplacian == recorded.parameters.laplacian,
             "PRECISION" => alone.parameters.precision == recorded.parameters.precision,
             "LAYERS" => alone.layers == recorded.layers,
             "SRS" => alone.srs == recorded.srs,

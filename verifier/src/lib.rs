@@ -6,6 +6,7 @@
 
 pub mod affine;
 pub mod candidates;
+pub mod compare;
 mod consensus;
 mod crs_search;
 pub mod cubic;

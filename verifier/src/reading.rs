@@ -2,8 +2,11 @@
 
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
-use meshmark_core::{key::SecretKey, options::Spelling, record::Record};
-use meshmark_dataset::{CoordinateSystem, LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
+use meshmark_core::{ground::Ground, key::SecretKey, options::Spelling, record::Record};
+use meshmark_dataset::{
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
+    survey,
+};
 use std::{
     collections::BTreeSet,
     io::Read,
@@ -90,6 +93,22 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
         check_fields(path, &dataset, names)?;
     }
     read("reference", path, &dataset, reading, Target::Own)
+}
+
+/// Reads a map for a comparison: its geometries in order, and metres on the ground.
+pub fn compared(
+    what: &str,
+    path: &Path,
+    layers: Option<&[String]>,
+) -> Result<(Vec<FeatureGeometry>, Ground)> {
+    let dataset = open(what, path, None)?;
+    let reading = Reading { layers, srs: None, landmarks: LabelFields::None };
+    let ground = read(what, path, &dataset, &reading, Target::Own)?.ground();
+    let failed =
+        |error: meshmark_dataset::Error| Error::Unreadable(format!("the {what} {}: {error}", path.display()));
+    *last_failure() = None;
+    let geometries = features(&dataset, layers, &|| last_failure().clone()).map_err(failed)?;
+    Ok((geometries, ground.map_err(failed)?))
 }
 
 /// A misspelt field would leave no landmark, and nobody would know why.

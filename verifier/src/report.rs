@@ -11,6 +11,7 @@ use crate::{
 use meshmark_core::{
     code::{Code, Decoder},
     demodulation::Demodulation,
+    options::{Laplacian, Shape},
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -94,6 +95,8 @@ pub struct ReportParameters {
     pub amplitude_m: f64,
     pub code: Code,
     pub chip_rate: usize,
+    pub shape: Shape,
+    pub basis: Laplacian,
     pub patch_size: usize,
     pub tolerance_m: f64,
     pub precision_crs_units: Option<f64>,
@@ -251,6 +254,8 @@ impl ReportParameters {
             amplitude_m: p.amplitude_m,
             code: p.code,
             chip_rate: p.chip_rate,
+            shape: p.shape,
+            basis: p.laplacian,
             patch_size: p.patch_size,
             tolerance_m: p.tolerance_m,
             precision_crs_units: p.precision,

@@ -129,14 +129,15 @@ pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Surv
 /// # Errors
 /// An unreadable suspect, parameters that do not fit the reference.
 pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Examination> {
-    let ground = reference.ground().map_err(|error| of_reference(request, error))?;
+    let map = reference.map().map_err(|error| of_reference(request, error))?;
+    let ground = map.ground;
     progress.start("reading", 0);
     let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All };
     let suspect = reading::suspect(&request.suspect, &plain, reference)?;
     let suspect_crs = suspect.layer_crs.clone();
 
     progress.start("patches", 0);
-    let patches = Patches::new(&reference.vertices, &ground, request.parameters.patch_size);
+    let patches = Patches::new(&map, &request.parameters);
     let patches = patches.map_err(|error| of_reference(request, error))?;
     let carriers = patches.carriers(request.bits, &request.parameters); // before the map is searched for
     carriers.map_err(|error| of_reference(request, error))?;

@@ -7,6 +7,7 @@ use meshmark_core::{
     embedding::embed,
     ground::Ground,
     key::SecretKey,
+    map::Map,
     message::Message,
     options::Parameters,
     patches::Patches,
@@ -24,6 +25,8 @@ use proptest::prelude::*;
 /// A marked map with labels on every twentieth vertex.
 struct Case {
     reference: VertexTable,
+    segments: Vec<[u32; 2]>,
+    polygons: Vec<u32>,
     ground: Ground,
     key: SecretKey,
     marked: Vec<[f64; 2]>,
@@ -42,10 +45,27 @@ impl Case {
             last_failure: &|| None,
         };
         let map = survey(&gdal::Dataset::open(path).unwrap(), &selection).unwrap();
-        let (ground, key) = (map.ground().unwrap(), SecretKey::from_bytes([7; 32]));
+        let (on_ground, key) = (map.map().unwrap(), SecretKey::from_bytes([7; 32]));
         let message = key.recipient_message("ACME GmbH");
-        let marked = embed(&map.vertices, &ground, &key, &message, &Parameters::default()).unwrap();
-        Case { reference: map.vertices, ground, key, marked: marked.coords }
+        let marked = embed(&on_ground, &key, &message, &Parameters::default()).unwrap();
+        let ground = on_ground.ground;
+        Case {
+            reference: map.vertices,
+            segments: map.segments,
+            polygons: map.polygons,
+            ground,
+            key,
+            marked: marked.coords,
+        }
+    }
+
+    fn map(&self) -> Map<'_> {
+        Map {
+            vertices: &self.reference,
+            segments: &self.segments,
+            polygons: &self.polygons,
+            ground: self.ground,
+        }
     }
 
     fn labels(&self, coords: &[[f64; 2]]) -> Vec<Label> {
@@ -73,7 +93,7 @@ impl Case {
             |(r, s): (&[f64; 2], &Option<u32>)| s.map(|s| self.ground.metres_between(*r, coords[s as usize]));
         let observed: Vec<_> = pairs.map(metres).collect();
         let parameters = Parameters::default();
-        let patches = Patches::new(&self.reference, &self.ground, parameters.patch_size).unwrap();
+        let patches = Patches::new(&self.map(), &parameters).unwrap();
         let disturbance = Deformation::estimate(&patches, &observed, 256, &parameters).unwrap().predict(
             &patches,
             &observed,
@@ -130,8 +150,7 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
     let case = Case::kotka();
     let message = |name: &str| case.key.recipient_message(name);
     let parameters = Parameters::default();
-    let other =
-        embed(&case.reference, &case.ground, &case.key, &message("Another Ltd"), &parameters).unwrap();
+    let other = embed(&case.map(), &case.key, &message("Another Ltd"), &parameters).unwrap();
     let pairs = case.marked.iter().zip(&other.coords);
     let mean: Vec<[f64; 2]> = pairs.map(|(a, b)| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]).collect();
     let found = case.demodulate(&mean, &case.key);
@@ -143,7 +162,7 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
 #[test]
 fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
     let case = Case::kotka();
-    let patches = Patches::new(&case.reference, &case.ground, 480).unwrap();
+    let patches = Patches::new(&case.map(), &Parameters::default()).unwrap();
     let pairs = case.reference.coords().iter().zip(&case.marked);
     let observed: Vec<_> = pairs.map(|(r, s)| Some(case.ground.metres_between(*r, *s))).collect();
     let p_mark = |seed: u8| {

@@ -3,8 +3,8 @@
 use meshmark_core::{
     code::Code,
     embedding::Displacement,
-    options::{Kind, OPTIONS},
-    record::{DisplacementEntry, Record, Reference},
+    options::{Kind, Laplacian, OPTIONS, Shape},
+    record::{DisplacementEntry, Record, Reference, TopologyEntry},
 };
 use serde_json::{Value, json};
 use std::{
@@ -81,11 +81,14 @@ fn record() -> Record {
         chip_rate: 2,
         patch_size: 480,
         tolerance_m: 0.75,
+        shape: Shape::Free,
+        basis: Laplacian::Biggs,
         precision_crs_units: None,
         layers: None,
         srs: None,
         reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
         displacement: DisplacementEntry::from(Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 }),
+        topology: TopologyEntry { t_junctions: 12, attenuated_vertices: 0 },
     }
 }
 
@@ -113,10 +116,37 @@ fn the_record_that_the_driver_wrote_is_valid() {
     assert_valid("record", &serde_json::from_str(&text).unwrap());
 }
 
+/// What the command prints of the test vectors.
+fn comparison() -> Value {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));
+    command.args(["compare", "--json"]);
+    command.args(["fixtures/kotka.gpkg", "fixtures/vectors/marked.gpkg"].map(|file| root().join(file)));
+    serde_json::from_slice(&command.output().unwrap().stdout).unwrap()
+}
+
+#[test]
+fn a_comparison_is_valid_and_wrong_ones_are_refused() {
+    let comparison = comparison();
+    assert_valid("compare", &comparison);
+    let objects = comparison.as_object().unwrap().iter().filter(|(_, value)| value.is_object());
+    let objects: Vec<String> = objects.map(|(name, _)| format!("/{name}")).collect();
+    assert_eq!(objects.len(), 8);
+    for object in &objects {
+        let fields = comparison.pointer(object).unwrap().as_object().unwrap();
+        let negative: Vec<(String, Value)> =
+            fields.keys().map(|field| (format!("{object}/{field}"), json!(-1))).collect();
+        let negative: Vec<(&str, Value)> = negative.iter().map(|(p, v)| (p.as_str(), v.clone())).collect();
+        assert_refused("compare", &comparison, &negative);
+    }
+    let mut closed = vec![""];
+    closed.extend(objects.iter().map(String::as_str));
+    assert_closed("compare", &comparison, &closed);
+}
+
 #[test]
 fn wrong_records_are_refused() {
     let record = json_of(&record());
-    assert_closed("record", &record, &["", "/reference", "/displacement"]);
+    assert_closed("record", &record, &["", "/reference", "/displacement", "/topology"]);
     let changes = [
         ("/meshmark_record", json!(2)),
         ("/key_id", json!("434471506306423")),
@@ -133,6 +163,8 @@ fn wrong_records_are_refused() {
         ("/reference/vertices_sha256", json!("0F".repeat(32))),
         ("/displacement/rms_m", json!(-0.1)),
         ("/displacement/max_m", Value::Null),
+        ("/topology/t_junctions", json!(-1)),
+        ("/topology/attenuated_vertices", json!(0.5)),
     ];
     assert_refused("record", &record, &changes);
 }

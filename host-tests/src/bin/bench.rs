@@ -102,9 +102,8 @@ impl Stages {
         let parameters = Parameters::default();
         let (key, message) = (key(), Message::from_bytes(&[0xa5; 16]));
         let (read, map) = best_of(2, || read(map))?;
-        let ground = map.ground()?;
-        let (cut, patches) = best_of(2, || Ok(Patches::new(&map.vertices, &ground, parameters.patch_size)?))?;
-        let (embed, _) = best_of(2, || Ok(embed(&map.vertices, &ground, &key, &message, &parameters)?))?;
+        let (cut, patches) = best_of(2, || Ok(Patches::new(&map.map()?, &parameters)?))?;
+        let (embed, _) = best_of(2, || Ok(embed(&map.map()?, &key, &message, &parameters)?))?;
         Ok(Stages {
             vertices: map.vertices.len(),
             patches: patches.as_slice().len(),

@@ -29,6 +29,9 @@ struct Arguments {
     /// Only these rows, for example 6,9c,dp0.5
     #[arg(long, value_delimiter = ',')]
     rows: Vec<String>,
+    /// A further option of the driver, for example SHAPE=RIGID; repeatable
+    #[arg(long, value_name = "NAME=VALUE")]
+    option: Vec<String>,
     /// Seed of keys and attacks
     #[arg(long, default_value_t = 2003)]
     seed: u64,
@@ -60,6 +63,7 @@ fn run_all(arguments: Arguments) -> Result<()> {
         Some(folder) => Product::in_folder(folder)?,
         None => Product::of_this_build()?,
     };
+    let product = product.with_options(arguments.option);
     let (quick, rows) = (arguments.quick, arguments.rows.clone());
     let wanted = move |case: &Case, profile: Profile| match rows.is_empty() {
         // The paper's two chip rates on its own rows; on all others the default and the coded message.

@@ -14,6 +14,8 @@ use std::{
 pub struct Product {
     meshmark: PathBuf,
     plugins: PathBuf,
+    /// Further options of the driver, NAME=value, that shape every mark.
+    options: Vec<String>,
 }
 
 /// How the bits of the message become chips.
@@ -103,7 +105,8 @@ impl Product {
     pub fn in_folder(folder: &Path) -> Result<Self> {
         // GDAL looks for the driver from wherever the host runs.
         let folder = folder.canonicalize().map_err(|e| format!("{}: {e}", folder.display()))?;
-        let product = Product { meshmark: folder.join("meshmark"), plugins: folder.join("gdalplugins") };
+        let (meshmark, plugins) = (folder.join("meshmark"), folder.join("gdalplugins"));
+        let product = Product { meshmark, plugins, options: Vec::new() };
         for file in [product.meshmark.clone(), product.plugins.join("ogr_MESHMARK.so")] {
             if !file.is_file() {
                 return Err(format!("{} is not there: run `make build` first", file.display()).into());
@@ -121,6 +124,11 @@ impl Product {
         let folders: Vec<&Path> = program.ancestors().skip(1).collect();
         let has_command = |folder: &&&Path| folder.join("meshmark").is_file();
         Self::in_folder(folders.iter().find(has_command).unwrap_or(&folders[0]))
+    }
+
+    /// The same with further options of the driver, NAME=value.
+    pub fn with_options(self, options: Vec<String>) -> Self {
+        Product { options, ..self }
     }
 
     /// What `meshmark --version` says.
@@ -151,6 +159,7 @@ impl Product {
         for (name, value) in options {
             command.arg("-oo").arg(format!("{name}={value}"));
         }
+        command.args(self.options.iter().flat_map(|option| ["-oo", option]));
         let output = command.output().map_err(|e| format!("ogr2ogr cannot be run: {e}"))?;
         match output.status.success() {
             true => Ok(()),
@@ -181,7 +190,8 @@ impl Product {
                 .args(["--recipient", marking.recipient])
                 .args(["--code", marking.profile.code])
                 .arg(format!("--chip-rate={}", marking.profile.chip_rate))
-                .arg(format!("--precision={}", marking.precision)),
+                .arg(format!("--precision={}", marking.precision))
+                .args(self.options.iter().map(|option| format!("--{}", option.to_lowercase()))),
         };
         let output = command.arg(suspect).output()?;
         // 0 match, 1 no match, 3 inconclusive; all others are no answer.

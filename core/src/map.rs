@@ -1,0 +1,29 @@
+//! A map as the algorithm sees it.
+
+use crate::{ground::Ground, vertices::VertexTable};
+
+/// Vertices, what joins them, and how long a unit is.
+#[derive(Debug, Clone, Copy)]
+pub struct Map<'a> {
+    /// The distinct vertices.
+    pub vertices: &'a VertexTable,
+    /// The segments of rings and lines: canonical indices [a, b] with a < b, sorted, each pair once. Points
+    /// have none.
+    pub segments: &'a [[u32; 2]],
+    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
+    pub polygons: &'a [u32],
+    /// Metres on the ground.
+    pub ground: Ground,
+}
+
+impl<'a> Map<'a> {
+    /// A map of points alone.
+    pub fn of_points(vertices: &'a VertexTable, ground: Ground) -> Self {
+        Map { vertices, segments: &[], polygons: &[], ground }
+    }
+
+    /// The coordinates of a vertex, CRS units.
+    pub(crate) fn at(&self, vertex: u32) -> [f64; 2] {
+        self.vertices.coords()[vertex as usize]
+    }
+}

@@ -1,0 +1,119 @@
+//! Where a vertex ends that shall move: within the tolerance, on the output grid, off the edges of the world.
+
+use crate::{Error, Result, ground::Ground, map::Map, options::Parameters};
+
+/// What holds a displacement back.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placement {
+    ground: Ground,
+    tolerance_m: f64,
+    precision: Option<f64>,
+}
+
+impl Placement {
+    /// # Errors
+    /// [`Error::PrecisionTooCoarse`].
+    pub fn new(map: &Map, parameters: &Parameters) -> Result<Self> {
+        check_precision(map, parameters)?;
+        let Parameters { tolerance_m, precision, .. } = *parameters;
+        Ok(Placement { ground: map.ground, tolerance_m, precision })
+    }
+
+    /// Where a vertex at `from` ends that should move by `wanted`, CRS units.
+    pub fn place(&self, from: [f64; 2], wanted: [f64; 2]) -> [f64; 2] {
+        if self.is_pinned(from) {
+            return from;
+        }
+        let scale = self.ground.metres_per_unit(from);
+        let wanted_m = (wanted[0] * scale[0]).hypot(wanted[1] * scale[1]);
+        let mut share = 1f64.min(self.tolerance_m / wanted_m);
+        loop {
+            let target = [0, 1].map(|a| from[a] + share * wanted[a]);
+            if let Some(precision) = self.precision {
+                return nearest_node(target, from, scale, precision, self.tolerance_m);
+            }
+            if distance_m(from, target, scale) <= self.tolerance_m {
+                return target;
+            }
+            share *= 1.0 - 1e-9; // the sum above was rounded past the tolerance
+            if share < 0.5 {
+                return from; // a coordinate so large that its last digit is worth more than the tolerance
+            }
+        }
+    }
+
+    /// Whether a vertex must stay where it is.
+    pub fn is_pinned(&self, from: [f64; 2]) -> bool {
+        self.ground.is_pinned(from, self.tolerance_m)
+    }
+
+    /// No vertex moves further, metres.
+    pub fn tolerance_m(&self) -> f64 {
+        self.tolerance_m
+    }
+
+    /// The side of a cell of the output grid, CRS units; 0 without a grid.
+    pub fn grid(&self) -> f64 {
+        self.precision.unwrap_or(0.0)
+    }
+}
+
+fn distance_m(a: [f64; 2], b: [f64; 2], scale: [f64; 2]) -> f64 {
+    ((b[0] - a[0]) * scale[0]).hypot((b[1] - a[1]) * scale[1])
+}
+
+/// The grid node nearest to `target` among those within the tolerance of `from`. `target` is within
+/// the tolerance too, and the tolerance is at least a cell, so there is one less than √2 cells away.
+fn nearest_node(
+    target: [f64; 2],
+    from: [f64; 2],
+    scale: [f64; 2],
+    precision: f64,
+    tolerance_m: f64,
+) -> [f64; 2] {
+    // A node of PRECISION=0.1 is k / 10, the number that prints as one decimal; k × 0.1 is not.
+    let per_unit = (1.0 / precision).round();
+    let decimal = per_unit >= 1.0 && (per_unit * precision - 1.0).abs() < 1e-9;
+    let node = |k: f64| if decimal { k / per_unit } else { k * precision };
+    let index = |value: f64| if decimal { (value * per_unit).round() } else { (value / precision).round() };
+    let nearest = target.map(|value| node(index(value)));
+    if distance_m(from, nearest, scale) <= tolerance_m {
+        return nearest;
+    }
+    let larger = scale[0].max(scale[1]);
+    let around = |axis: usize| {
+        let reach = (1.5 * larger / scale[axis]).ceil().min(1000.0);
+        (0..=2 * reach as usize).map(move |step| node(index(target[axis]) - reach + step as f64))
+    };
+    around(0)
+        .flat_map(|x| around(1).map(move |y| [x, y]))
+        .filter(|&n| distance_m(from, n, scale) <= tolerance_m)
+        .min_by(|&a, &b| distance_m(target, a, scale).total_cmp(&distance_m(target, b, scale)))
+        .unwrap_or(from)
+}
+
+fn check_precision(map: &Map, parameters: &Parameters) -> Result<()> {
+    let Some(precision) = parameters.precision else { return Ok(()) };
+    let (min, max) = map.vertices.bounds();
+    // A degree of longitude is longest where the map comes nearest to the equator.
+    let widest_y = if min[1] <= 0.0 && max[1] >= 0.0 { 0.0 } else { min[1].abs().min(max[1].abs()) };
+    let scale = [min[1], max[1], widest_y].map(|y| map.ground.metres_per_unit([min[0], y]));
+    let metres = precision * scale.iter().flatten().fold(0f64, |a, &b| a.max(b));
+    if metres > parameters.tolerance_m {
+        return Err(Error::PrecisionTooCoarse { precision, metres, tolerance_m: parameters.tolerance_m });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_is_the_decimal_number_and_never_out_of_reach() {
+        let scale = [1.0, 1.0];
+        assert_eq!(nearest_node([0.26, 0.74], [0.31, 0.7], scale, 0.1, 0.75), [0.3, 0.7]);
+        // The node nearest to the target is 0.8 away; the best one within 0.75 is taken.
+        assert_eq!(nearest_node([0.6, 0.0], [0.2, 0.0], scale, 1.0, 0.75), [0.0, 0.0]);
+    }
+}

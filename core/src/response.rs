@@ -1,0 +1,180 @@
+//! How the vertices of a patch respond to its coefficients, constraints included.
+
+use crate::{options::Shape, patches::Patch, spectrum::Basis};
+use faer::{
+    Accum, Mat, Par, Scale,
+    linalg::matmul::triangular::{self, BlockStructure},
+};
+
+/// What unit coefficients move, per axis n × k.
+pub(crate) enum Response {
+    /// Both axes respond alike, each to its own coefficients.
+    Separate(Mat<f64>),
+    /// A body that turns couples them: `[a][b]` is how axis a responds to coefficients of axis b.
+    Coupled([[Mat<f64>; 2]; 2]),
+}
+
+/// The products of all columns with all columns.
+pub(crate) struct Kernel {
+    /// Of columns of one axis with each other, for the axes named: lower triangles, k × k.
+    pub own: Vec<(Vec<usize>, Mat<f64>)>,
+    /// Of columns of the first axis (rows) with those of the second (columns), where they are not 0.
+    pub cross: Option<Mat<f64>>,
+}
+
+impl Kernel {
+    /// The sum of the diagonal.
+    pub fn trace(&self) -> f64 {
+        let of = |(axes, lower): &(Vec<usize>, Mat<f64>)| {
+            axes.len() as f64 * (0..lower.ncols()).map(|i| lower[(i, i)]).sum::<f64>()
+        };
+        self.own.iter().map(of).sum()
+    }
+}
+
+impl Response {
+    /// The response to the coefficients that carry the mark, all but the mean. With SHAPE=rigid it is amplified:
+    /// then the mark is expected to move vertices as far, root mean square, as it moves free ones.
+    pub fn carriers(patch: &Patch, basis: &Basis, shape: Shape) -> Self {
+        let carriers = basis.vectors.ncols() - 1;
+        let mut response = Self::new(patch, basis.vectors.subcols(1, carriers).to_owned());
+        if shape == Shape::Rigid {
+            let gain = response.gain();
+            response.blocks_mut().iter_mut().for_each(|block| *block *= Scale(gain));
+        }
+        response
+    }
+
+    /// The root of what columns of length 1 move, squared, over what these move.
+    pub fn gain(&self) -> f64 {
+        let energy: f64 = self.blocks().iter().map(|block| block.squared_norm_l2()).sum();
+        let free = match self {
+            Response::Separate(block) => block.ncols(),
+            Response::Coupled(blocks) => 2 * blocks[0][0].ncols(),
+        };
+        if energy > 0.0 { (free as f64 / energy).sqrt() } else { 1.0 }
+    }
+
+    /// The response to basis functions (columns, n × k): free vertices follow them, bodies as well as they can,
+    /// hanging vertices what they hang on.
+    pub fn new(patch: &Patch, basis: Mat<f64>) -> Self {
+        let mut response = match patch.bodies.is_empty() {
+            true => Response::Separate(basis),
+            false => Response::Coupled(coupled(patch, basis)),
+        };
+        response.blocks_mut().iter_mut().for_each(|block| patch.follow(block));
+        response
+    }
+
+    fn blocks_mut(&mut self) -> &mut [Mat<f64>] {
+        match self {
+            Response::Separate(block) => std::slice::from_mut(block),
+            Response::Coupled(blocks) => blocks.as_flattened_mut(),
+        }
+    }
+
+    /// The covariance over vertices of the displacement along one axis, for random coefficients of ±1; where the axes
+    /// differ, their mean.
+    pub fn covariance(&self) -> Mat<f64> {
+        let of = |block: &Mat<f64>| block * block.transpose();
+        match self {
+            Response::Separate(block) => of(block),
+            Response::Coupled([[xx, xy], [yx, yy]]) => (of(xx) + of(xy) + of(yx) + of(yy)) * Scale(0.5),
+        }
+    }
+
+    /// The same of every block transformed.
+    pub fn map(self, f: impl Fn(Mat<f64>) -> Mat<f64>) -> Self {
+        match self {
+            Response::Separate(block) => Response::Separate(f(block)),
+            Response::Coupled(blocks) => Response::Coupled(blocks.map(|row| row.map(&f))),
+        }
+    }
+
+    /// Products of all columns with all columns.
+    pub fn kernel(&self) -> Kernel {
+        match self {
+            Response::Separate(block) => Kernel { own: vec![(vec![0, 1], lower_gram(block))], cross: None },
+            Response::Coupled([[xx, xy], [yx, yy]]) => Kernel {
+                own: vec![
+                    (vec![0], lower_gram(xx) + lower_gram(yx)),
+                    (vec![1], lower_gram(xy) + lower_gram(yy)),
+                ],
+                cross: Some(xx.transpose() * xy + yx.transpose() * yy),
+            },
+        }
+    }
+
+    /// Products of the columns of either axis with displacements (n × 2).
+    pub fn correlations(&self, moved: &Mat<f64>) -> [Vec<f64>; 2] {
+        let (x, y) = (moved.col(0), moved.col(1));
+        let products = match self {
+            Response::Separate(block) => [block.transpose() * x, block.transpose() * y],
+            Response::Coupled([[xx, xy], [yx, yy]]) => {
+                [xx.transpose() * x + yx.transpose() * y, xy.transpose() * x + yy.transpose() * y]
+            }
+        };
+        products.map(|product| product.iter().copied().collect())
+    }
+
+    fn blocks(&self) -> &[Mat<f64>] {
+        match self {
+            Response::Separate(block) => std::slice::from_ref(block),
+            Response::Coupled(blocks) => blocks.as_flattened(),
+        }
+    }
+
+    /// The rows of some vertices.
+    pub fn rows(&self, rows: &[usize]) -> Self {
+        let of = |block: &Mat<f64>| Mat::from_fn(rows.len(), block.ncols(), |o, i| block[(rows[o], i)]);
+        match self {
+            Response::Separate(block) => Response::Separate(of(block)),
+            Response::Coupled(blocks) => {
+                Response::Coupled(blocks.each_ref().map(|row| row.each_ref().map(of)))
+            }
+        }
+    }
+}
+
+/// The lower triangle of XᵀX, zeros above it.
+fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
+    let mut gram = Mat::zeros(x.ncols(), x.ncols());
+    triangular::matmul(
+        gram.as_mut(),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        x.transpose(),
+        BlockStructure::Rectangular,
+        x,
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    gram
+}
+
+/// Bodies take the mean of their vertices as a shift, and turn by θ = Σ (r_x u_y − r_y u_x) / Σ |r|²: the rigid
+/// motion nearest to the displacements u.
+fn coupled(patch: &Patch, basis: Mat<f64>) -> [[Mat<f64>; 2]; 2] {
+    let (n, columns) = (basis.nrows(), basis.ncols());
+    let mut blocks = [[basis.clone(), Mat::zeros(n, columns)], [Mat::zeros(n, columns), basis]];
+    for body in &patch.bodies {
+        let inertia: f64 = body.arms_m.iter().map(|[x, y]| x * x + y * y).sum();
+        for column in 0..columns {
+            let own: Vec<f64> = body.rows.iter().map(|&row| blocks[0][0][(row as usize, column)]).collect();
+            let moment = |axis: usize| {
+                let sum: f64 = body.arms_m.iter().zip(&own).map(|(arm, value)| arm[axis] * value).sum();
+                if inertia > 0.0 { sum / inertia } else { 0.0 }
+            };
+            let (shift, moments) = (own.iter().sum::<f64>() / own.len() as f64, [moment(0), moment(1)]);
+            for (&row, [x, y]) in body.rows.iter().zip(&body.arms_m) {
+                let at = (row as usize, column);
+                blocks[0][0][at] = shift + y * moments[1];
+                blocks[0][1][at] = -y * moments[0];
+                blocks[1][0][at] = -x * moments[1];
+                blocks[1][1][at] = shift + x * moments[0];
+            }
+        }
+    }
+    blocks
+}

@@ -1,0 +1,296 @@
+//! Moving vertices without changing the topology of the map: no vertex passes through a segment.
+//!
+//! Where the mark would push one through, the vertices involved become a cluster that moves more and more as one,
+//! then less and less. A map that does not move at all is always legal, so this ends.
+
+use crate::{
+    bodies::{Body, Motion},
+    constraints::Constraints,
+    junctions::JUNCTION_M,
+    map::Map,
+    motion::{Slack, keeps_apart},
+    nearness::VertexTree,
+    placement::Placement,
+};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How a cluster moves at each level of attenuation: the share of its mean displacement, and the share of what its
+/// members' displacements differ by. Level 0 is a vertex that no other restrains.
+const LEVELS: [(f64, f64); 6] = [(1.0, 1.0), (1.0, 0.5), (1.0, 0.25), (1.0, 0.0), (0.5, 0.0), (0.0, 0.0)];
+/// The last level: all members stay where they are.
+const FROZEN: usize = LEVELS.len() - 1;
+/// The level at which clusters that meet start again: they move as one.
+const RIGID: usize = 3;
+
+/// A map after marking.
+pub(crate) struct Settled {
+    /// The new place of every vertex, CRS units.
+    pub coords: Vec<[f64; 2]>,
+    /// How many vertices moved otherwise than they should have.
+    pub attenuated: usize,
+    /// By how much, metres along an axis: root mean square over all vertices.
+    pub deviation_m: f64,
+}
+
+/// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest to it, as far as
+/// the topology of the map and the placement allow; `tree` holds all vertices. On a grid too coarse for the map,
+/// rounding alone may change topology; that is left.
+pub(crate) fn settle(
+    map: &Map,
+    tree: &VertexTree,
+    constraints: &Constraints,
+    wanted: &[[f64; 2]],
+    placement: &Placement,
+) -> Settled {
+    let mut movement = Movement::new(*map, constraints, wanted, placement);
+    let free = movement.coords.clone();
+    let mut clusters = Clusters::new(wanted.len());
+    let mut changed: Option<Changed> = None;
+    loop {
+        let hits = movement.hits(tree, changed.as_ref());
+        let touched = clusters.merge(hits.iter().map(|hit| movement.movers(hit)));
+        if touched.is_empty() {
+            break;
+        }
+        touched.iter().for_each(|root| movement.attenuate(&clusters.clusters[root]));
+        changed = Some(movement.advance());
+    }
+    let attenuated = free.iter().zip(&movement.coords).filter(|(a, b)| a != b).count();
+    let apart = |(a, b): (&[f64; 2], &[f64; 2])| {
+        let [dx, dy] = map.ground.metres_between(*a, *b);
+        dx * dx + dy * dy
+    };
+    let energy: f64 = free.iter().zip(&movement.coords).map(apart).sum();
+    let deviation_m = (energy / (2 * wanted.len()) as f64).sqrt();
+    Settled { coords: movement.coords, attenuated, deviation_m }
+}
+
+/// A vertex and a segment that come together.
+type Hit = [u32; 3];
+
+/// Where everything goes. What moves by itself is a free vertex, or a body, which goes by its first vertex.
+struct Movement<'a> {
+    map: Map<'a>,
+    constraints: &'a Constraints,
+    placement: &'a Placement,
+    slack: Slack,
+    /// CRS units.
+    wanted: &'a [[f64; 2]],
+    /// CRS units; those of hanging vertices and of members of bodies follow.
+    displacements: Vec<[f64; 2]>,
+    coords: Vec<[f64; 2]>,
+}
+
+/// Vertices that have moved since the last look.
+struct Changed<'a> {
+    is_changed: Vec<bool>,
+    tree: VertexTree<'a>,
+}
+
+impl<'a> Movement<'a> {
+    fn new(
+        map: Map<'a>,
+        constraints: &'a Constraints,
+        wanted: &'a [[f64; 2]],
+        placement: &'a Placement,
+    ) -> Self {
+        let (min, max) = map.vertices.bounds();
+        let [_, metres_per_unit] = map.ground.metres_per_unit(map.vertices.centre());
+        let largest = min.iter().chain(&max).fold(0f64, |largest, value| largest.max(value.abs()));
+        let slack = Slack::new(
+            largest * f64::EPSILON * metres_per_unit,
+            placement.grid() * metres_per_unit,
+            JUNCTION_M,
+        );
+        let (displacements, coords) = (wanted.to_vec(), map.vertices.coords().to_vec());
+        let mut movement = Movement { map, constraints, placement, slack, wanted, displacements, coords };
+        for body in constraints.bodies.as_slice() {
+            movement.move_by(body.members[0], movement.wanted_of(body.members[0]));
+        }
+        movement.place();
+        movement
+    }
+
+    fn body(&self, vertex: u32) -> Option<&'a Body> {
+        self.constraints.bodies.of(vertex).map(|body| &self.constraints.bodies.as_slice()[body])
+    }
+
+    /// How a free vertex or a body should move.
+    fn wanted_of(&self, mover: u32) -> Motion {
+        let wanted_m =
+            |scale: [f64; 2], v: u32| [0, 1].map(|axis| self.wanted[v as usize][axis] * scale[axis]);
+        match self.body(mover) {
+            Some(body) => {
+                let all: Vec<[f64; 2]> = body.members.iter().map(|&v| wanted_m(body.scale, v)).collect();
+                body.nearest_motion(&all)
+            }
+            None => Motion { shift_m: wanted_m(self.scale(mover), mover), turn: 0.0 },
+        }
+    }
+
+    fn move_by(&mut self, mover: u32, motion: Motion) {
+        let in_units = |[x, y]: [f64; 2], scale: [f64; 2]| [x / scale[0], y / scale[1]];
+        let Some(body) = self.body(mover) else {
+            self.displacements[mover as usize] = in_units(motion.shift_m, self.scale(mover));
+            return;
+        };
+        let motion = match body.members.iter().any(|&v| self.placement.is_pinned(self.map.at(v))) {
+            true => Motion::default(),
+            false => body.within(motion, self.placement.tolerance_m()),
+        };
+        for (&v, displacement_m) in body.members.iter().zip(body.displacements_m(&motion)) {
+            self.displacements[v as usize] = in_units(displacement_m, body.scale);
+        }
+    }
+
+    fn scale(&self, vertex: u32) -> [f64; 2] {
+        self.map.ground.metres_per_unit(self.map.at(vertex))
+    }
+
+    /// Lets the members of a cluster move as its level says.
+    fn attenuate(&mut self, cluster: &Cluster) {
+        let (of_mean, of_rest) = LEVELS[cluster.level];
+        let wanted: Vec<Motion> = cluster.members.iter().map(|&mover| self.wanted_of(mover)).collect();
+        let mean = [0, 1]
+            .map(|axis| wanted.iter().map(|motion| motion.shift_m[axis]).sum::<f64>() / wanted.len() as f64);
+        for (&mover, motion) in cluster.members.iter().zip(wanted) {
+            let shift = |axis: usize| of_mean * mean[axis] + of_rest * (motion.shift_m[axis] - mean[axis]);
+            self.move_by(mover, Motion { shift_m: [0, 1].map(shift), turn: of_rest * motion.turn });
+        }
+    }
+
+    /// Lets hanging vertices follow and places all.
+    fn place(&mut self) {
+        self.constraints.junctions.follow(&mut self.displacements);
+        let place = |(from, displacement): (&[f64; 2], &[f64; 2])| self.placement.place(*from, *displacement);
+        self.coords = self.map.vertices.coords().par_iter().zip(&self.displacements).map(place).collect();
+    }
+
+    /// The same, and what that changes.
+    fn advance(&mut self) -> Changed<'a> {
+        let before = std::mem::take(&mut self.coords);
+        self.place();
+        let is_changed: Vec<bool> = before.iter().zip(&self.coords).map(|(a, b)| a != b).collect();
+        let changed = (0u32..).zip(&is_changed).filter(|(_, changed)| **changed).map(|(v, _)| v);
+        Changed { tree: VertexTree::new(self.map, changed), is_changed }
+    }
+
+    /// All vertices that meet a segment on their way, or, after a change, those that the change concerns.
+    fn hits(&self, tree: &VertexTree, changed: Option<&Changed>) -> Vec<Hit> {
+        let moved =
+            |v: usize| [0, 1].map(|axis| (self.coords[v][axis] - self.map.vertices.coords()[v][axis]).abs());
+        let furthest = (0..self.coords.len()).into_par_iter().map(moved).reduce(|| [0.0; 2], larger);
+        let of_segment = |&[a, b]: &[u32; 2]| {
+            let near = match changed {
+                Some(changed) if !changed.is_changed[a as usize] && !changed.is_changed[b as usize] => {
+                    &changed.tree
+                }
+                _ => tree,
+            };
+            let ends = larger(moved(a as usize), moved(b as usize));
+            // A little more for the least gap, whatever a unit is.
+            let reach = [0, 1].map(|axis| 1.001 * (ends[axis] + furthest[axis]));
+            let found = near.around([a, b], reach).map(move |v| [v, a, b]);
+            found.filter(|&triple| !self.keeps_apart(triple)).collect::<Vec<Hit>>()
+        };
+        self.map.segments.par_iter().flat_map_iter(of_segment).collect()
+    }
+
+    fn keeps_apart(&self, triple: Hit) -> bool {
+        let before = triple.map(|v| self.map.at(v));
+        let after = triple.map(|v| self.coords[v as usize]);
+        keeps_apart(&before, &after, self.map.ground.metres_per_unit(before[0]), self.slack)
+    }
+
+    /// The free vertices and bodies whose displacements make a hit.
+    fn movers(&self, hit: &Hit) -> Vec<u32> {
+        let mover = |vertex: u32| self.body(vertex).map_or(vertex, |body| body.members[0]);
+        let of = |vertex: &u32| match self.constraints.junctions.of(*vertex) {
+            Some(hanging) => hanging.anchors.iter().map(|(anchor, _)| mover(*anchor)).collect(),
+            None => vec![mover(*vertex)],
+        };
+        hit.iter().flat_map(of).collect()
+    }
+}
+
+fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].max(b[0]), a[1].max(b[1])]
+}
+
+/// Movers that move together, as disjoint sets.
+struct Clusters {
+    parent: Vec<u32>,
+    /// By their roots. One body alone is a cluster, too: its turn may carry it through what hangs on it.
+    clusters: BTreeMap<u32, Cluster>,
+}
+
+#[derive(Default)]
+struct Cluster {
+    members: Vec<u32>,
+    level: usize,
+}
+
+impl Clusters {
+    fn new(vertices: usize) -> Self {
+        Clusters { parent: (0..vertices as u32).collect(), clusters: BTreeMap::new() }
+    }
+
+    fn root(&mut self, mut vertex: u32) -> u32 {
+        while self.parent[vertex as usize] != vertex {
+            let above = self.parent[self.parent[vertex as usize] as usize];
+            self.parent[vertex as usize] = above;
+            vertex = above;
+        }
+        vertex
+    }
+
+    /// Joins the vertices of every hit and raises the level of the clusters they come to be in: their roots.
+    /// What is frozen as a whole cannot be helped further and is not among them.
+    fn merge(&mut self, hits: impl Iterator<Item = Vec<u32>>) -> BTreeSet<u32> {
+        let (mut joined, mut again) = (BTreeSet::new(), Vec::new());
+        for movers in hits {
+            let roots: BTreeSet<u32> = movers.iter().map(|&v| self.root(v)).collect();
+            if roots.len() == 1 && self.clusters.contains_key(&movers_root(&roots)) {
+                again.push(movers_root(&roots));
+            } else {
+                joined.insert(self.join(roots));
+            }
+        }
+        let joined: BTreeSet<u32> = joined.into_iter().map(|root| self.root(root)).collect();
+        for &root in &joined {
+            let cluster = self.clusters.get_mut(&root).expect("it was joined");
+            cluster.level = cluster.level.clamp(1, RIGID);
+        }
+        let mut touched = joined.clone();
+        let again: BTreeSet<u32> = again.into_iter().map(|root| self.root(root)).collect();
+        for root in again.difference(&joined) {
+            let cluster = self.clusters.get_mut(root).expect("it was joined before");
+            if cluster.level < FROZEN {
+                cluster.level += 1;
+                touched.insert(*root);
+            }
+        }
+        touched
+    }
+
+    fn join(&mut self, roots: BTreeSet<u32>) -> u32 {
+        let size = |root: &u32| self.clusters.get(root).map_or(1, |cluster| cluster.members.len());
+        let largest =
+            *roots.iter().max_by_key(|root| (size(root), u32::MAX - **root)).expect("a hit has vertices");
+        let single = |root: u32| Cluster { members: vec![root], level: 0 };
+        let mut all = self.clusters.remove(&largest).unwrap_or_else(|| single(largest));
+        for root in roots.into_iter().filter(|&root| root != largest) {
+            let other = self.clusters.remove(&root).unwrap_or_else(|| single(root));
+            self.parent[root as usize] = largest;
+            all.members.extend(other.members);
+            all.level = all.level.max(other.level);
+        }
+        self.clusters.insert(largest, all);
+        largest
+    }
+}
+
+fn movers_root(roots: &BTreeSet<u32>) -> u32 {
+    *roots.first().expect("a hit has vertices")
+}

@@ -1,0 +1,68 @@
+//! Geometries one by one, for comparing two maps feature by feature.
+
+use crate::{
+    Error, Result,
+    survey::chosen_layers,
+    wkb::{self, Step},
+};
+use gdal::{Dataset, vector::LayerAccess};
+
+/// One geometry of a dataset.
+#[derive(Debug, Clone)]
+pub struct FeatureGeometry {
+    /// The name of its layer.
+    pub layer: String,
+    /// The feature's id, when it has one.
+    pub fid: Option<u64>,
+    /// Well-known binary.
+    pub wkb: Vec<u8>,
+    /// Its rings, lines and points: coordinates in CRS units, a ring closed by its first one.
+    pub chains: Vec<Vec<[f64; 2]>>,
+}
+
+/// The geometries of all features of the chosen layers (all when `None`), in the order of the dataset; features
+/// without one are left out. `last_failure` is as in [`crate::Selection`].
+///
+/// # Errors
+/// A layer that does not exist or cannot be read to its end, or a geometry that makes no sense.
+pub fn features(
+    dataset: &Dataset,
+    layers: Option<&[String]>,
+    last_failure: &dyn Fn() -> Option<String>,
+) -> Result<Vec<FeatureGeometry>> {
+    let mut all = Vec::new();
+    for (index, name) in chosen_layers(dataset, layers)? {
+        let mut layer = dataset.layer(index)?;
+        let columns = layer.defn().geom_fields().count();
+        for feature in layer.features() {
+            for column in 0..columns {
+                let Ok(geometry) = feature.geometry_by_index(column) else { continue }; // a null geometry
+                let fid = feature.fid();
+                let failed = |reason: String| Error::Geometry {
+                    layer: name.clone(),
+                    fid: fid.map_or("without id".into(), |fid| fid.to_string()),
+                    reason,
+                };
+                let mut wkb = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
+                let chains = chains(&mut wkb).map_err(|error| failed(error.to_string()))?;
+                all.push(FeatureGeometry { layer: name.clone(), fid, wkb, chains });
+            }
+        }
+        if let Some(reason) = last_failure() {
+            return Err(Error::Unreadable { layer: name, reason });
+        }
+    }
+    Ok(all)
+}
+
+fn chains(wkb: &mut [u8]) -> std::result::Result<Vec<Vec<[f64; 2]>>, wkb::WkbError> {
+    let mut chains: Vec<Vec<[f64; 2]>> = Vec::new();
+    wkb::map_coordinates::<wkb::WkbError>(wkb, &mut |step, point| {
+        match (step, chains.last_mut()) {
+            (Step::Next, Some(chain)) => chain.push(point),
+            _ => chains.push(vec![point]),
+        }
+        Ok(point)
+    })?;
+    Ok(chains)
+}

@@ -1,0 +1,153 @@
+//! What marking does to maps: `quality MAP...` marks each with every SHAPE and BASIS through the driver, compares it
+//! with the original by `meshmark compare`, and prints a Markdown table. It fails when a polygon has become
+//! invalid, or two overlap that did not.
+
+use meshmark_core::options::{Laplacian, Shape};
+use serde_json::Value;
+use std::{
+    error::Error,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode, Output},
+};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+fn main() -> ExitCode {
+    match run(&std::env::args_os().skip(1).map(PathBuf::from).collect::<Vec<_>>()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => {
+            eprintln!("quality: marking made polygons invalid or overlap");
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            eprintln!("quality: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Whether every map stayed as good as it was.
+fn run(maps: &[PathBuf]) -> Result<bool> {
+    if maps.is_empty() {
+        return Err("usage: quality MAP...".into());
+    }
+    let work = Work::new()?;
+    println!("{HEADER}");
+    let mut good = true;
+    for map in maps {
+        for shape in Shape::NAMES {
+            for basis in Laplacian::NAMES {
+                let marked = work.mark(map, shape, basis).map_err(|e| format!("{}: {e}", map.display()))?;
+                println!("{}", row(map, shape, basis, &marked));
+                good &= marked.number("/validity/newly_invalid") == 0.0;
+                good &= marked.number("/overlaps/new") == 0.0;
+            }
+        }
+    }
+    Ok(good)
+}
+
+const HEADER: &str = "\
+| map | shape | basis | vertices | T-junctions | attenuated | invalid, new | overlaps, new | crossings, new and lost | angle change, mean and p99 (°) | right angles kept | RMS (m) |
+|---|---|---|---|---|---|---|---|---|---|---|---|";
+
+fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
+    let n = |pointer: &str| marked.number(pointer);
+    let record = |pointer: &str| marked.record.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    format!(
+        "| {} | {} | {} | {} | {} | {} | {}, {} | {}, {} | {}, {} | {:.2}, {:.1} | {:.1} % | {:.3} |",
+        map.file_stem().unwrap_or_default().to_string_lossy(),
+        shape.to_lowercase(),
+        basis.to_lowercase(),
+        n("/compared/vertices"),
+        record("/topology/t_junctions"),
+        record("/topology/attenuated_vertices"),
+        n("/validity/invalid_before"),
+        n("/validity/newly_invalid"),
+        n("/overlaps/before"),
+        n("/overlaps/new"),
+        n("/crossings/new"),
+        n("/crossings/lost"),
+        n("/angles/mean_change_deg"),
+        n("/angles/p99_change_deg"),
+        100.0 * n("/angles/right_angles_kept"),
+        n("/displacement/rms_m"),
+    )
+}
+
+/// What `meshmark compare` and the record say.
+struct Marked {
+    comparison: Value,
+    record: Value,
+}
+
+impl Marked {
+    fn number(&self, pointer: &str) -> f64 {
+        self.comparison.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN)
+    }
+}
+
+/// A folder for the copies, and where the programs are.
+struct Work {
+    folder: tempfile::TempDir,
+    meshmark: PathBuf,
+    plugins: PathBuf,
+}
+
+impl Work {
+    fn new() -> Result<Self> {
+        let here = std::env::current_exe()?.parent().ok_or("this program has no folder")?.to_path_buf();
+        let work = Work {
+            folder: tempfile::tempdir()?,
+            meshmark: here.join("meshmark"),
+            plugins: here.join("gdalplugins"),
+        };
+        if !work.meshmark.exists() || !work.plugins.exists() {
+            return Err("the driver or the command is missing: run `make build` first".into());
+        }
+        let key = meshmark_core::key::SecretKey::from_bytes([7; 32]);
+        fs::write(work.path("key.json"), key.to_json().as_bytes())?;
+        Ok(work)
+    }
+
+    fn path(&self, file: &str) -> PathBuf {
+        self.folder.path().join(file)
+    }
+
+    fn mark(&self, map: &Path, shape: &str, basis: &str) -> Result<Marked> {
+        let (copy, record) = (self.path("marked.gpkg"), self.path("record.json"));
+        for file in [&copy, &record] {
+            if file.exists() {
+                fs::remove_file(file)?;
+            }
+        }
+        let mut command = Command::new("ogr2ogr");
+        command.env("GDAL_DRIVER_PATH", &self.plugins).args(["-q", "-f", "GPKG"]).arg(&copy);
+        command.arg(format!("MESHMARK:{}", map.canonicalize()?.display()));
+        for (name, value) in [
+            ("KEY", self.path("key.json").display().to_string()),
+            ("RECIPIENT", "quality".into()),
+            ("RECORD", record.display().to_string()),
+            ("SHAPE", shape.into()),
+            ("BASIS", basis.into()),
+        ] {
+            command.arg("-oo").arg(format!("{name}={value}"));
+        }
+        succeeded(command.output()?)?;
+        let comparison =
+            succeeded(Command::new(&self.meshmark).args(["compare", "--json"]).args([map, &copy]).output()?)?;
+        Ok(Marked {
+            comparison: serde_json::from_slice(&comparison)?,
+            record: serde_json::from_slice(&fs::read(record)?)?,
+        })
+    }
+}
+
+/// What a program printed; what it complained about as an error.
+fn succeeded(output: Output) -> Result<Vec<u8>> {
+    match output.status.success() {
+        true => Ok(output.stdout),
+        false => Err(String::from_utf8_lossy(&output.stderr).trim().into()),
+    }
+}

@@ -1,0 +1,66 @@
+//! Marking through the driver keeps real maps as good as they were, and the message is read from every kind of mark.
+
+use meshmark_core::options::{Laplacian, Shape};
+use meshmark_host_tests::plugin::{Host, library};
+use serde_json::Value;
+
+/// What the command prints as JSON.
+fn meshmark(host: &Host, arguments: &[&str]) -> Value {
+    let run = host.run(library().with_file_name("meshmark").to_str().unwrap(), arguments).succeeds();
+    serde_json::from_str(&run.stdout).unwrap()
+}
+
+fn number(document: &Value, pointer: &str) -> f64 {
+    document.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} of {document:#}"))
+}
+
+#[test]
+fn no_polygon_becomes_invalid_and_none_overlap_that_did_not() {
+    for fixture in ["helsinki.gpkg", "kotka.gpkg", "astana.gpkg", "europe_deg.gpkg", "shapes.gpkg"] {
+        for (shape, basis) in Shape::NAMES.iter().zip(Laplacian::NAMES) {
+            let host = Host::new();
+            host.copy(fixture, "map.gpkg");
+            let (shape, basis) = (format!("SHAPE={shape}"), format!("BASIS={basis}"));
+            let options = ["-oo", "RECORD=record.json", "-oo", &shape, "-oo", &basis];
+            host.mark("GPKG", "marked.gpkg", "map.gpkg", &options).succeeds();
+            let compared = meshmark(&host, &["compare", "--json", "map.gpkg", "marked.gpkg"]);
+            for pointer in [
+                "/compared/torn_vertices",
+                "/validity/newly_invalid",
+                "/overlaps/new",
+                "/crossings/new",
+                "/crossings/lost",
+            ] {
+                assert_eq!(number(&compared, pointer), 0.0, "{fixture} {shape} {basis}: {pointer}");
+            }
+            let record: Value =
+                serde_json::from_slice(&std::fs::read(host.path("record.json")).unwrap()).unwrap();
+            for figure in ["rms_m", "p99_m", "max_m"] {
+                let pointer = format!("/displacement/{figure}");
+                assert!(
+                    (number(&record, &pointer) - number(&compared, &pointer)).abs() < 1e-9,
+                    "{fixture} {figure}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn right_angles_stay_right_when_shapes_are_rigid_and_the_message_is_read() {
+    for basis in Laplacian::NAMES {
+        let host = Host::new();
+        host.copy("kotka.gpkg", "map.gpkg");
+        let basis = format!("BASIS={basis}");
+        let options = ["-oo", "RECORD=record.json", "-oo", "SHAPE=RIGID", "-oo", &basis];
+        host.mark("GPKG", "marked.gpkg", "map.gpkg", &options).succeeds();
+        let compared =
+            meshmark(&host, &["compare", "--json", "--layers", "buildings", "map.gpkg", "marked.gpkg"]);
+        assert_eq!(number(&compared, "/angles/right_angles_kept"), 1.0, "{compared:#}");
+        assert!(number(&compared, "/displacement/rms_m") > 0.08);
+        let verify =
+            ["verify", "--json", "--key", "key.json", "--reference", "map.gpkg", "--record", "record.json"];
+        let report = meshmark(&host, &[&verify[..], &["marked.gpkg"]].concat());
+        assert_eq!((&report["verdict"], number(&report, "/bit_errors")), (&"match".into(), 0.0));
+    }
+}

@@ -1,0 +1,228 @@
+//! What marking did to a map: `meshmark compare REFERENCE MARKED`.
+//!
+//! Features correspond by their order within a layer, vertices by their order within a feature: the driver changes
+//! neither. Lengths, angles and areas are those on the ground.
+
+mod quantiles;
+mod shape;
+mod text;
+mod topology;
+
+use crate::{Error, Result, reading};
+use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_dataset::FeatureGeometry;
+use serde::Serialize;
+use std::path::Path;
+
+/// The figures of a comparison. `docs/compare.schema.json` describes them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Version of this format.
+    pub meshmark_comparison: u32,
+    /// How much was compared.
+    pub compared: Compared,
+    /// How far vertices are from where they were.
+    pub displacement: Displacement,
+    /// How far features are from where they were, as sets of points.
+    pub hausdorff: Hausdorff,
+    /// Angles between consecutive segments.
+    pub angles: Angles,
+    /// Areas of polygons.
+    pub areas: Areas,
+    /// Validity by GEOS.
+    pub validity: Validity,
+    /// Polygons that overlap, by GEOS.
+    pub overlaps: Overlaps,
+    /// Segments that cross.
+    pub crossings: Crossings,
+}
+
+/// Counts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// Geometries.
+    pub features: usize,
+    /// Distinct vertices of the reference.
+    pub vertices: usize,
+    /// Those whose occurrences are no longer at one place.
+    pub torn_vertices: usize,
+}
+
+/// Of distinct vertices, metres.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs)] // the names say it
+pub struct Displacement {
+    pub rms_m: f64,
+    pub p99_m: f64,
+    pub max_m: f64,
+}
+
+/// Hausdorff distances of features, metres.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs)]
+pub struct Hausdorff {
+    pub p99_m: f64,
+    pub max_m: f64,
+}
+
+/// Changes of angles, degrees.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Angles {
+    /// Angles of the reference.
+    pub count: usize,
+    /// Mean change.
+    pub mean_change_deg: f64,
+    /// 99th percentile.
+    pub p99_change_deg: f64,
+    /// Angles within 1° of a right one in the reference.
+    pub right_angles: usize,
+    /// The share of these that changed by 1° at most; 1 when there is none.
+    pub right_angles_kept: f64,
+}
+
+/// Changes of areas, as shares of the area before.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Areas {
+    /// Polygons and multipolygons.
+    pub polygons: usize,
+    /// Mean.
+    pub mean_change: f64,
+    /// 99th percentile.
+    pub p99_change: f64,
+    /// The largest.
+    pub max_change: f64,
+}
+
+/// Geometries that GEOS calls invalid.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Validity {
+    /// In the reference.
+    pub invalid_before: usize,
+    /// In the marked map.
+    pub invalid_after: usize,
+    /// Those that were valid before.
+    pub newly_invalid: usize,
+}
+
+/// Pairs of polygons that overlap by more than 1e-6 m².
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Overlaps {
+    /// In the reference.
+    pub before: usize,
+    /// In the marked map.
+    pub after: usize,
+    /// Those that did not overlap before.
+    pub new: usize,
+    /// Their area, m².
+    pub new_area_m2: f64,
+}
+
+/// Pairs of segments of any features that cross by more than 1e-6 m.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Crossings {
+    /// In the reference.
+    pub before: usize,
+    /// In the marked map.
+    pub after: usize,
+    /// Pairs that did not cross before, by no distance.
+    pub new: usize,
+    /// Pairs that cross no longer, by no distance.
+    pub lost: usize,
+}
+
+/// Two maps, feature by feature.
+pub(crate) struct Pairs {
+    pub features: Vec<Pair>,
+    pub ground: Ground,
+}
+
+/// A geometry before and after.
+pub(crate) struct Pair {
+    pub before: FeatureGeometry,
+    pub after: FeatureGeometry,
+}
+
+/// Compares two files.
+///
+/// # Errors
+/// Unreadable input, a reference without a CRS, or maps whose features do not correspond.
+pub fn compare(reference: &Path, marked: &Path, layers: Option<&[String]>) -> Result<Comparison> {
+    let (before, ground) = reading::compared("reference", reference, layers)?;
+    let (after, _) = reading::compared("marked map", marked, layers)?;
+    if before.len() != after.len() {
+        let (b, a) = (before.len(), after.len());
+        return Err(Error::Usage(format!(
+            "the reference has {b} geometries and the marked map {a}: compare a map with the copy that was marked \
+             from it, before anything is removed"
+        )));
+    }
+    let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
+    Ok(Pairs { features, ground }.compare())
+}
+
+fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
+    let counts = |feature: &FeatureGeometry| feature.chains.iter().map(Vec::len).collect::<Vec<_>>();
+    if before.layer != after.layer || counts(&before) != counts(&after) {
+        let fid = before.fid.map_or("without id".into(), |fid| fid.to_string());
+        return Err(Error::Usage(format!(
+            "layer \"{}\", feature {fid} of the reference does not have the vertices of its counterpart in the marked \
+             map (layer \"{}\"): features correspond by their order",
+            before.layer, after.layer
+        )));
+    }
+    Ok(Pair { before, after })
+}
+
+impl Pairs {
+    fn compare(&self) -> Comparison {
+        let all = |map: fn(&Pair) -> &FeatureGeometry| {
+            self.features.iter().flat_map(move |pair| map(pair).chains.iter().flatten().copied())
+        };
+        let (vertices, indices) =
+            VertexTable::indexed(all(|pair| &pair.before).collect()).expect("a map that was read is finite");
+        let mut moved: Vec<Option<[f64; 2]>> = vec![None; vertices.len()];
+        let mut torn = vec![false; vertices.len()];
+        for (&index, to) in indices.iter().zip(all(|pair| &pair.after)) {
+            let place = moved[index as usize].get_or_insert(to);
+            torn[index as usize] |= *place != to;
+        }
+        let moved: Vec<[f64; 2]> = moved.into_iter().map(|to| to.expect("every vertex occurs")).collect();
+        Comparison {
+            meshmark_comparison: 1,
+            compared: Compared {
+                features: self.features.len(),
+                vertices: vertices.len(),
+                torn_vertices: torn.into_iter().filter(|torn| *torn).count(),
+            },
+            displacement: shape::displacement(&vertices, &moved, &self.ground),
+            hausdorff: self.hausdorff(),
+            angles: self.angles(),
+            areas: self.areas(),
+            validity: self.validity(),
+            overlaps: self.overlaps(),
+            crossings: topology::crossings(&self.segments(&indices), vertices.coords(), &moved, &self.ground),
+        }
+    }
+
+    /// The distinct segments, as pairs of indices.
+    fn segments(&self, indices: &[u32]) -> Vec<[u32; 2]> {
+        let mut rest = indices;
+        let mut segments = Vec::new();
+        for chain in self.features.iter().flat_map(|pair| &pair.before.chains) {
+            let (own, others) = rest.split_at(chain.len());
+            segments.extend(own.windows(2).map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])]));
+            rest = others;
+        }
+        segments.retain(|[a, b]| a != b);
+        segments.sort_unstable();
+        segments.dedup();
+        segments
+    }
+
+    /// Metres per unit at a geometry.
+    fn scale(&self, geometry: &FeatureGeometry) -> [f64; 2] {
+        self.ground.metres_per_unit(
+            geometry.chains.first().and_then(|chain| chain.first()).copied().unwrap_or_default(),
+        )
+    }
+}

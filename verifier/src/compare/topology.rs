@@ -1,0 +1,153 @@
+//! Validity, overlaps and crossings.
+
+use super::{Crossings, Overlaps, Pair, Pairs, Validity};
+use gdal::vector::Geometry;
+use meshmark_core::ground::Ground;
+use meshmark_dataset::FeatureGeometry;
+use rayon::prelude::*;
+use robust::{Coord, orient2d};
+use rstar::{
+    AABB, RTree, RTreeObject,
+    primitives::{GeomWithData, Rectangle},
+};
+use std::collections::BTreeSet;
+
+/// Overlaps up to this are slivers of rounding, square metres.
+const SLIVER_M2: f64 = 1e-6;
+/// Crossings up to this are rounding, metres.
+const GRAZE_M: f64 = 1e-6;
+
+fn geometry(feature: &FeatureGeometry) -> Option<Geometry> {
+    Geometry::from_wkb(&feature.wkb).ok()
+}
+
+fn is_valid(feature: &FeatureGeometry) -> bool {
+    geometry(feature).is_some_and(|geometry| geometry.is_valid())
+}
+
+impl Pairs {
+    pub(super) fn validity(&self) -> Validity {
+        let each = |pair: &Pair| [is_valid(&pair.before), is_valid(&pair.after)];
+        let valid: Vec<[bool; 2]> = self.features.par_iter().map(each).collect();
+        let count = |wanted: fn(&[bool; 2]) -> bool| valid.iter().filter(|v| wanted(v)).count();
+        Validity {
+            invalid_before: count(|v| !v[0]),
+            invalid_after: count(|v| !v[1]),
+            newly_invalid: count(|v| v[0] && !v[1]),
+        }
+    }
+
+    /// Overlaps among polygons that are valid in both maps; GEOS has no answer for others.
+    pub(super) fn overlaps(&self) -> Overlaps {
+        let polygons = self.polygons();
+        let tree = RTree::bulk_load(polygons.clone());
+        let of_polygon = |polygon: &Polygon| -> Vec<[f64; 2]> {
+            let near = tree.locate_in_envelope_intersecting(&polygon.envelope());
+            let later = near.filter(|other| other.data > polygon.data);
+            let mut later: Vec<u32> = later.map(|other| other.data).collect();
+            later.sort_unstable();
+            self.common_areas(polygon.data, &later)
+        };
+        let areas: Vec<[f64; 2]> = polygons.par_iter().flat_map_iter(of_polygon).collect();
+        let new: Vec<f64> =
+            areas.iter().filter(|[b, a]| *b <= SLIVER_M2 && *a > SLIVER_M2).map(|[b, a]| a - b).collect();
+        Overlaps {
+            before: areas.iter().filter(|[before, _]| *before > SLIVER_M2).count(),
+            after: areas.iter().filter(|[_, after]| *after > SLIVER_M2).count(),
+            new: new.len(),
+            new_area_m2: new.iter().fold(0.0, |sum, area| sum + area),
+        }
+    }
+
+    fn polygons(&self) -> Vec<Polygon> {
+        let polygon = |(number, pair): (usize, &Pair)| {
+            let (before, after) = (geometry(&pair.before)?, geometry(&pair.after)?);
+            if before.area() <= 0.0 || !before.is_valid() || !after.is_valid() {
+                return None;
+            }
+            let (a, b) = (before.envelope(), after.envelope());
+            let lower = [a.MinX.min(b.MinX), a.MinY.min(b.MinY)];
+            let upper = [a.MaxX.max(b.MaxX), a.MaxY.max(b.MaxY)];
+            Some(Polygon::new(Rectangle::from_corners(lower, upper), number as u32))
+        };
+        self.features.par_iter().enumerate().filter_map(polygon).collect()
+    }
+
+    /// The area that a polygon has in common with each of some others, before and after, square metres.
+    fn common_areas(&self, polygon: u32, others: &[u32]) -> Vec<[f64; 2]> {
+        if others.is_empty() {
+            return Vec::new();
+        }
+        let pair = &self.features[polygon as usize];
+        let [x, y] = self.scale(&pair.before);
+        let (before, after) = (geometry(&pair.before), geometry(&pair.after));
+        let common = |a: &Option<Geometry>, b: &FeatureGeometry| {
+            let (Some(a), Some(b)) = (a, geometry(b)) else { return 0.0 };
+            a.intersection(&b).map_or(0.0, |common| common.area() * x * y)
+        };
+        let each = |other: &u32| {
+            let other = &self.features[*other as usize];
+            [common(&before, &other.before), common(&after, &other.after)]
+        };
+        others.iter().map(each).collect()
+    }
+}
+
+type Polygon = GeomWithData<Rectangle<[f64; 2]>, u32>;
+type Segment = GeomWithData<Rectangle<[f64; 2]>, u32>;
+
+/// Counts pairs of segments that cross before and after.
+pub(super) fn crossings(
+    segments: &[[u32; 2]],
+    before: &[[f64; 2]],
+    after: &[[f64; 2]],
+    ground: &Ground,
+) -> Crossings {
+    let (old, new) = (crossing_pairs(segments, before), crossing_pairs(segments, after));
+    let is_deep = |[i, j]: &[u32; 2], coords: &[[f64; 2]]| {
+        let ends = [*i, *j].map(|s| segments[s as usize].map(|v| coords[v as usize]));
+        depth_m(ends, ground) > GRAZE_M
+    };
+    Crossings {
+        before: old.iter().filter(|pair| is_deep(pair, before)).count(),
+        after: new.iter().filter(|pair| is_deep(pair, after)).count(),
+        new: new.difference(&old).filter(|pair| is_deep(pair, after)).count(),
+        lost: old.difference(&new).filter(|pair| is_deep(pair, before)).count(),
+    }
+}
+
+fn crossing_pairs(segments: &[[u32; 2]], coords: &[[f64; 2]]) -> BTreeSet<[u32; 2]> {
+    let ends = |segment: u32| segments[segment as usize].map(|v| coords[v as usize]);
+    let leaf = |number: u32| {
+        let [p, q] = ends(number);
+        Segment::new(Rectangle::from_corners(p, q), number)
+    };
+    let leaves: Vec<Segment> = (0..segments.len() as u32).map(leaf).collect();
+    let tree = RTree::bulk_load(leaves.clone());
+    let of_segment = |leaf: &Segment| {
+        let envelope: AABB<[f64; 2]> = leaf.envelope();
+        let later = tree.locate_in_envelope_intersecting(&envelope).filter(|other| other.data > leaf.data);
+        let crossing = later.filter(|other| cross(ends(leaf.data), ends(other.data)));
+        crossing.map(|other| [leaf.data, other.data]).collect::<Vec<_>>()
+    };
+    leaves.par_iter().flat_map_iter(of_segment).collect()
+}
+
+fn side(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
+    let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
+    orient2d(coord(a), coord(b), coord(p))
+}
+
+/// Whether the ends of either are on different sides of the other.
+fn cross([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+/// How far the nearest of the four ends of two crossing segments is from the other segment's line.
+fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], ground: &Ground) -> f64 {
+    let height = |a: [f64; 2], b: [f64; 2], p: [f64; 2]| {
+        let ([ex, ey], [px, py]) = (ground.metres_between(a, b), ground.metres_between(a, p));
+        (ex * py - ey * px).abs() / ex.hypot(ey)
+    };
+    height(a, b, c).min(height(a, b, d)).min(height(c, d, a)).min(height(c, d, b))
+}
