@@ -7,7 +7,7 @@ use crate::{
     plot::{Axis, Plot, Series},
     table2::{
         Result,
-        product::{Marking, Product, Profile, write_key},
+        product::{Marking, Product, Profile, random_key},
     },
 };
 use meshmark_core::{
@@ -47,8 +47,9 @@ const SUSPECTS: [(&str, bool, Option<&str>); 6] = [
     ("unmarked, local deformation", false, Some("6")),
 ];
 
-/// Takes `count` wrong keys and as many wrong recipients to every suspect made of one map. The right key and the
-/// wrong ones come from `seed`.
+/// Takes `count` wrong keys and as many wrong recipients to every suspect made of one map. The right key and, after
+/// it, the wrong ones come from `seed`; no suspect meets those of another, for p-values of one key on two copies of a
+/// map are not independent.
 ///
 /// # Errors
 /// A map that cannot be read, marked or registered.
@@ -56,30 +57,31 @@ pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<V
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
     let (key, reference, marked) = (path("key.json"), path("reference.gpkg"), path("marked.gpkg"));
-    write_key(&key, seed)?;
+    let mut random = Random::new(seed);
+    let right = random_key(&mut random);
+    std::fs::write(&key, right.to_json().as_bytes())?;
     let original = noise::snap(&Map::read(map)?, PRECISION_M);
     original.write(&reference)?;
     let (recipient, profile) = ("the recipient", Profile::repetition(2));
     let marking = Marking { key: &key, recipient, profile, precision: PRECISION_M };
     product.mark(&reference, &marked, &path("record.json"), marking)?;
     let marked = Map::read(&marked)?;
-    let key = SecretKey::from_json(&std::fs::read_to_string(&key)?)?;
     let name = map.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let sample = |(suspect, is_marked, row): (&'static str, bool, Option<&str>)| {
+    let sample = |(number, (suspect, is_marked, row)): (usize, (&'static str, bool, Option<&str>))| {
         let file = path("suspect.gpkg");
         let attacked = attack(row).apply(if is_marked { &marked } else { &original }, seed)?;
         attacked.write(&file)?;
-        let found = examine(&key, &reference, &file)?;
+        let found = examine(&right, &reference, &file)?;
         std::fs::remove_file(&file)?;
-        let mut random = Random::new(seed);
+        let innocent = |i: usize| wrong_recipient(&found, &right, number * count + i);
         Ok(Sample {
             map: name.clone(),
             suspect,
-            wrong_keys: (0..count).map(|_| wrong_key(&found, &mut random)).collect(),
-            wrong_recipients: (0..count).map(|i| wrong_recipient(&found, &key, i)).collect(),
+            wrong_keys: (0..count).map(|_| wrong_key(&found, &random_key(&mut random))).collect(),
+            wrong_recipients: (0..count).map(innocent).collect(),
         })
     };
-    SUSPECTS.into_iter().map(sample).collect()
+    SUSPECTS.into_iter().enumerate().map(sample).collect()
 }
 
 fn attack(row: Option<&str>) -> Attack {
@@ -110,12 +112,9 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     Ok(verify::examine(&request, &map, &mut progress)?.found?)
 }
 
-/// log₁₀ of p_mark of one more key and its message for a recipient.
-fn wrong_key(found: &Demodulation, random: &mut Random) -> f64 {
-    let mut secret = [0; 32];
-    secret.chunks_mut(8).for_each(|bytes| bytes.copy_from_slice(&random.seed().to_le_bytes()));
-    let key = SecretKey::from_bytes(secret);
-    let (carrier, chip_rate) = (Carrier::new(&key), Parameters::default().chip_rate);
+/// log₁₀ of p_mark of another key and its message for the recipient.
+fn wrong_key(found: &Demodulation, key: &SecretKey) -> f64 {
+    let (carrier, chip_rate) = (Carrier::new(key), Parameters::default().chip_rate);
     let carriers = found.scores.len() * chip_rate;
     let mut scores = vec![0.0; found.scores.len()];
     for (number, correlations) in found.chip_correlations.chunks(carriers).enumerate() {

@@ -1,6 +1,7 @@
 //! The product as its users have it: the driver inside `ogr2ogr`, and the command `meshmark`.
 
 use super::Result;
+use crate::attacks::Random;
 use meshmark_core::key::SecretKey;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -211,8 +212,13 @@ fn printed(output: &Output) -> String {
 /// # Errors
 /// The file cannot be written.
 pub fn write_key(path: &Path, seed: u64) -> Result<()> {
-    let mut random = crate::attacks::Random::new(seed);
+    let key = random_key(&mut Random::new(seed));
+    Ok(std::fs::write(path, key.to_json().as_bytes())?)
+}
+
+/// The next key of a stream.
+pub fn random_key(random: &mut Random) -> SecretKey {
     let mut secret = [0; 32];
     secret.chunks_mut(8).for_each(|bytes| bytes.copy_from_slice(&random.seed().to_le_bytes()));
-    Ok(std::fs::write(path, SecretKey::from_bytes(secret).to_json().as_bytes())?)
+    SecretKey::from_bytes(secret)
 }
