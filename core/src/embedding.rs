@@ -5,6 +5,7 @@ use crate::{
     carrier::{Carrier, bit_of_coefficient},
     deformation::{Deformation, Prediction},
     demodulation::joint,
+    distortion::{AngleChange, Displacement},
     key::SecretKey,
     map::Map,
     message::Message,
@@ -18,17 +19,6 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// How far the vertices moved, metres on the ground.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Displacement {
-    /// Root mean square.
-    pub rms_m: f64,
-    /// 99th percentile.
-    pub p99_m: f64,
-    /// The largest.
-    pub max_m: f64,
-}
-
 /// A marked map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
@@ -38,6 +28,8 @@ pub struct Marked {
     pub patches: usize,
     /// How far the vertices moved.
     pub displacement: Displacement,
+    /// How much the angles at its corners changed.
+    pub angles: AngleChange,
     /// How many vertices hang on a segment and moved with it.
     pub junctions: usize,
     /// How many vertices moved otherwise than the mark wanted, for the map to keep its topology.
@@ -64,7 +56,8 @@ pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Paramet
     let settled = settle(map, &tree, patches.constraints(), &job.wanted(&patches)?, &placement);
     job.check_message(message, &patches, &settled)?;
     Ok(Marked {
-        displacement: displacement(map, &settled.coords),
+        displacement: Displacement::between(map.vertices, &settled.coords, &map.ground),
+        angles: AngleChange::at_corners(map, &settled.coords),
         coords: settled.coords,
         patches: patches.as_slice().len(),
         junctions: patches.constraints().junctions.hanging().len(),
@@ -150,20 +143,5 @@ impl Job<'_> {
             0 => Ok(()),
             errors => Err(Error::MessageLost { errors, bits: message.len() }),
         }
-    }
-}
-
-fn displacement(map: &Map, coords: &[[f64; 2]]) -> Displacement {
-    let moved = |(&from, &to): (&[f64; 2], &[f64; 2])| {
-        let [dx, dy] = map.ground.metres_between(from, to);
-        dx.hypot(dy)
-    };
-    let mut metres: Vec<f64> = map.vertices.coords().iter().zip(coords).map(moved).collect();
-    metres.sort_unstable_by(f64::total_cmp);
-    let last = metres.len() - 1;
-    Displacement {
-        rms_m: (metres.iter().map(|d| d * d).sum::<f64>() / metres.len() as f64).sqrt(),
-        p99_m: metres[last * 99 / 100],
-        max_m: metres[last],
     }
 }

@@ -42,6 +42,7 @@ pub mod code;
 pub mod constraints;
 pub mod deformation;
 pub mod demodulation;
+pub mod distortion;
 pub mod embedding;
 mod error;
 pub mod ground;

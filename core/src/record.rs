@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     code::Code,
-    embedding::Displacement,
+    distortion::{AngleChange, Displacement},
     message::Message,
     options::{Laplacian, Parameters, Shape, Subject},
 };
@@ -50,7 +50,9 @@ pub struct Record {
     /// The reference map.
     pub reference: Reference,
     /// How far its vertices moved.
-    pub displacement: DisplacementEntry,
+    pub displacement: Displacement,
+    /// How much the angles at its corners changed.
+    pub angles: AngleChange,
     /// What keeping the topology took.
     pub topology: TopologyEntry,
 }
@@ -69,18 +71,6 @@ pub struct Reference {
     pub crs: Option<String>,
 }
 
-/// [`Displacement`] as JSON.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DisplacementEntry {
-    /// Root mean square.
-    pub rms_m: f64,
-    /// 99th percentile.
-    pub p99_m: f64,
-    /// The largest.
-    pub max_m: f64,
-}
-
 /// What a record says about the topology of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -89,12 +79,6 @@ pub struct TopologyEntry {
     pub t_junctions: usize,
     /// Vertices that moved otherwise than the mark wanted, so that nothing crosses that did not.
     pub attenuated_vertices: usize,
-}
-
-impl From<Displacement> for DisplacementEntry {
-    fn from(d: Displacement) -> Self {
-        DisplacementEntry { rms_m: d.rms_m, p99_m: d.p99_m, max_m: d.max_m }
-    }
 }
 
 impl Record {
@@ -108,7 +92,6 @@ impl Record {
             let found = record.meshmark_record;
             return Err(Error::Record(format!("version {found} instead of {VERSION}")));
         }
-        record.parameters()?;
         record.parameters()?;
         let bits = record.message()?.len();
         record.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;

@@ -291,7 +291,8 @@ fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
             vertices_sha256: map.vertices.digest(),
             crs: map.crs.as_ref().map(|crs| crs.label()),
         },
-        displacement: marked.displacement.into(),
+        displacement: marked.displacement,
+        angles: marked.angles,
         topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
     }
 }

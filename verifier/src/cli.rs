@@ -53,6 +53,9 @@ struct CompareArgs {
     /// Comma-separated layers to compare; all by default
     #[arg(long, value_delimiter = ',')]
     layers: Vec<String>,
+    /// Grid of the marked map, CRS units: overlaps up to a cell of it count as slivers
+    #[arg(long)]
+    precision: Option<f64>,
     /// Print the comparison as one JSON object
     #[arg(long)]
     json: bool,
@@ -192,7 +195,7 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
 
 fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
     let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
-    let comparison = compare(&args.reference, &args.marked, layers)?;
+    let comparison = compare(&args.reference, &args.marked, layers, args.precision)?;
     print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
     Ok(ExitCode::Match)
 }

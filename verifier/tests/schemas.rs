@@ -2,9 +2,9 @@
 
 use meshmark_core::{
     code::Code,
-    embedding::Displacement,
+    distortion::{AngleChange, Displacement},
     options::{Kind, Laplacian, OPTIONS, Shape},
-    record::{DisplacementEntry, Record, Reference, TopologyEntry},
+    record::{Record, Reference, TopologyEntry},
 };
 use serde_json::{Value, json};
 use std::{
@@ -87,7 +87,8 @@ fn record() -> Record {
         layers: None,
         srs: None,
         reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
-        displacement: DisplacementEntry::from(Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 }),
+        displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },
+        angles: AngleChange::of(&[[90.0, 91.0], [200.0, 190.0]]),
         topology: TopologyEntry { t_junctions: 12, attenuated_vertices: 0 },
     }
 }
@@ -146,7 +147,7 @@ fn a_comparison_is_valid_and_wrong_ones_are_refused() {
 #[test]
 fn wrong_records_are_refused() {
     let record = json_of(&record());
-    assert_closed("record", &record, &["", "/reference", "/displacement", "/topology"]);
+    assert_closed("record", &record, &["", "/reference", "/displacement", "/angles", "/topology"]);
     let changes = [
         ("/meshmark_record", json!(2)),
         ("/key_id", json!("434471506306423")),
@@ -163,6 +164,7 @@ fn wrong_records_are_refused() {
         ("/reference/vertices_sha256", json!("0F".repeat(32))),
         ("/displacement/rms_m", json!(-0.1)),
         ("/displacement/max_m", Value::Null),
+        ("/angles/right_angles_kept", json!(1.1)),
         ("/topology/t_junctions", json!(-1)),
         ("/topology/attenuated_vertices", json!(0.5)),
     ];

@@ -3,13 +3,16 @@
 //! Features correspond by their order within a layer, vertices by their order within a feature: the driver changes
 //! neither. Lengths, angles and areas are those on the ground.
 
-mod quantiles;
 mod shape;
 mod text;
 mod topology;
 
 use crate::{Error, Result, reading};
-use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_core::{
+    distortion::{AngleChange, Displacement},
+    ground::Ground,
+    vertices::VertexTable,
+};
 use meshmark_dataset::FeatureGeometry;
 use serde::Serialize;
 use std::path::Path;
@@ -26,7 +29,7 @@ pub struct Comparison {
     /// How far features are from where they were, as sets of points.
     pub hausdorff: Hausdorff,
     /// Angles between consecutive segments.
-    pub angles: Angles,
+    pub angles: AngleChange,
     /// Areas of polygons.
     pub areas: Areas,
     /// Validity by GEOS.
@@ -48,36 +51,12 @@ pub struct Compared {
     pub torn_vertices: usize,
 }
 
-/// Of distinct vertices, metres.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs)] // the names say it
-pub struct Displacement {
-    pub rms_m: f64,
-    pub p99_m: f64,
-    pub max_m: f64,
-}
-
 /// Hausdorff distances of features, metres.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(missing_docs)]
 pub struct Hausdorff {
     pub p99_m: f64,
     pub max_m: f64,
-}
-
-/// Changes of angles, degrees.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Angles {
-    /// Angles of the reference.
-    pub count: usize,
-    /// Mean change.
-    pub mean_change_deg: f64,
-    /// 99th percentile.
-    pub p99_change_deg: f64,
-    /// Angles within 1° of a right one in the reference.
-    pub right_angles: usize,
-    /// The share of these that changed by 1° at most; 1 when there is none.
-    pub right_angles_kept: f64,
 }
 
 /// Changes of areas, as shares of the area before.
@@ -104,7 +83,7 @@ pub struct Validity {
     pub newly_invalid: usize,
 }
 
-/// Pairs of polygons that overlap by more than 1e-6 m².
+/// Pairs of polygons that overlap by more than a sliver: 1e-6 m², or a cell of the grid if one is given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Overlaps {
     /// In the reference.
@@ -115,6 +94,8 @@ pub struct Overlaps {
     pub new: usize,
     /// Their area, m².
     pub new_area_m2: f64,
+    /// Pairs that did not overlap before and do now, by a sliver.
+    pub new_slivers: usize,
 }
 
 /// Pairs of segments of any features that cross by more than 1e-6 m.
@@ -134,6 +115,8 @@ pub struct Crossings {
 pub(crate) struct Pairs {
     pub features: Vec<Pair>,
     pub ground: Ground,
+    /// The grid of the marked map, CRS units; 0 without.
+    pub grid: f64,
 }
 
 /// A geometry before and after.
@@ -142,11 +125,16 @@ pub(crate) struct Pair {
     pub after: FeatureGeometry,
 }
 
-/// Compares two files.
+/// Compares two files. `precision` is the grid of the marked one, CRS units: overlaps up to a cell of it are slivers.
 ///
 /// # Errors
 /// Unreadable input, a reference without a CRS, or maps whose features do not correspond.
-pub fn compare(reference: &Path, marked: &Path, layers: Option<&[String]>) -> Result<Comparison> {
+pub fn compare(
+    reference: &Path,
+    marked: &Path,
+    layers: Option<&[String]>,
+    precision: Option<f64>,
+) -> Result<Comparison> {
     let (before, ground) = reading::compared("reference", reference, layers)?;
     let (after, _) = reading::compared("marked map", marked, layers)?;
     if before.len() != after.len() {
@@ -157,7 +145,7 @@ pub fn compare(reference: &Path, marked: &Path, layers: Option<&[String]>) -> Re
         )));
     }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
-    Ok(Pairs { features, ground }.compare())
+    Ok(Pairs { features, ground, grid: precision.unwrap_or(0.0) }.compare())
 }
 
 fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
@@ -194,7 +182,7 @@ impl Pairs {
                 vertices: vertices.len(),
                 torn_vertices: torn.into_iter().filter(|torn| *torn).count(),
             },
-            displacement: shape::displacement(&vertices, &moved, &self.ground),
+            displacement: Displacement::between(&vertices, &moved, &self.ground),
             hausdorff: self.hausdorff(),
             angles: self.angles(),
             areas: self.areas(),

@@ -1,23 +1,11 @@
 //! Distances, angles and areas.
 
-use super::{Angles, Areas, Displacement, Hausdorff, Pair, Pairs, quantiles::Spread};
+use super::{Areas, Hausdorff, Pair, Pairs};
 use gdal::vector::Geometry;
-use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_core::distortion::{AngleChange, Spread, angle_deg};
 use meshmark_dataset::FeatureGeometry;
 use rayon::prelude::*;
 use rstar::{PointDistance, RTree, primitives::Line};
-
-/// An angle is right, or kept, within this many degrees.
-const RIGHT_DEG: f64 = 1.0;
-
-pub(super) fn displacement(vertices: &VertexTable, moved: &[[f64; 2]], ground: &Ground) -> Displacement {
-    let metres = |(from, to): (&[f64; 2], &[f64; 2])| {
-        let [dx, dy] = ground.metres_between(*from, *to);
-        dx.hypot(dy)
-    };
-    let spread = Spread::of(vertices.coords().iter().zip(moved).map(metres).collect());
-    Displacement { rms_m: spread.rms, p99_m: spread.p99, max_m: spread.max }
-}
 
 impl Pairs {
     pub(super) fn hausdorff(&self) -> Hausdorff {
@@ -30,7 +18,7 @@ impl Pairs {
         Hausdorff { p99_m: spread.p99, max_m: spread.max }
     }
 
-    pub(super) fn angles(&self) -> Angles {
+    pub(super) fn angles(&self) -> AngleChange {
         let each = |pair: &Pair| {
             let scale = self.scale(&pair.before);
             let chains = pair.before.chains.iter().zip(&pair.after.chains);
@@ -38,18 +26,7 @@ impl Pairs {
         };
         let all = self.features.iter().flat_map(each);
         let all: Vec<[f64; 2]> = all.filter_map(|(before, after)| Some([before?, after?])).collect();
-        let change = |[before, after]: &[f64; 2]| (after - before).abs().min(360.0 - (after - before).abs());
-        let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
-        let right: Vec<&[f64; 2]> = all.iter().filter(|[before, _]| is_right(*before)).collect();
-        let kept = right.iter().filter(|angle| change(angle) <= RIGHT_DEG).count();
-        let spread = Spread::of(all.iter().map(change).collect());
-        Angles {
-            count: all.len(),
-            mean_change_deg: spread.mean,
-            p99_change_deg: spread.p99,
-            right_angles: right.len(),
-            right_angles_kept: if right.is_empty() { 1.0 } else { kept as f64 / right.len() as f64 },
-        }
+        AngleChange::of(&all)
     }
 
     pub(super) fn areas(&self) -> Areas {
@@ -75,15 +52,7 @@ fn corners(chain: &[[f64; 2]], scale: [f64; 2]) -> Vec<Option<f64>> {
     let is_ring = chain.len() > 3 && chain.first() == chain.last();
     let closing = if is_ring { Some([chain[chain.len() - 2], chain[0], chain[1]]) } else { None };
     let inner = chain.windows(3).map(|w| [w[0], w[1], w[2]]);
-    inner.chain(closing).map(|[from, at, to]| corner(from, at, to, scale)).collect()
-}
-
-fn corner(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Option<f64> {
-    let direction = |p: [f64; 2]| {
-        let [x, y] = [0, 1].map(|i| (p[i] - at[i]) * scale[i]);
-        (x != 0.0 || y != 0.0).then(|| y.atan2(x))
-    };
-    Some((direction(from)? - direction(to)?).to_degrees().rem_euclid(360.0))
+    inner.chain(closing).map(|[from, at, to]| angle_deg(from, at, to, scale)).collect()
 }
 
 /// A feature as segments (points as segments of no length), metres.

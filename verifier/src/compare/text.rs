@@ -47,8 +47,12 @@ impl Comparison {
                 validity.invalid_before, validity.invalid_after, validity.newly_invalid
             ),
             format!(
-                "overlaps:     {} pairs before, {} after, {} new ({:.6} m²)",
-                overlaps.before, overlaps.after, overlaps.new, overlaps.new_area_m2
+                "overlaps:     {} pairs before, {} after, {} new ({:.6} m²), {} new slivers",
+                overlaps.before,
+                overlaps.after,
+                overlaps.new,
+                overlaps.new_area_m2,
+                overlaps.new_slivers
             ),
             format!(
                 "crossings:    {} pairs of segments before, {} after, {} new, {} lost",

@@ -41,21 +41,22 @@ impl Pairs {
     pub(super) fn overlaps(&self) -> Overlaps {
         let polygons = self.polygons();
         let tree = RTree::bulk_load(polygons.clone());
-        let of_polygon = |polygon: &Polygon| -> Vec<[f64; 2]> {
+        let of_polygon = |polygon: &Polygon| -> Vec<Overlap> {
             let near = tree.locate_in_envelope_intersecting(&polygon.envelope());
             let later = near.filter(|other| other.data > polygon.data);
             let mut later: Vec<u32> = later.map(|other| other.data).collect();
             later.sort_unstable();
             self.common_areas(polygon.data, &later)
         };
-        let areas: Vec<[f64; 2]> = polygons.par_iter().flat_map_iter(of_polygon).collect();
-        let new: Vec<f64> =
-            areas.iter().filter(|[b, a]| *b <= SLIVER_M2 && *a > SLIVER_M2).map(|[b, a]| a - b).collect();
+        let all: Vec<Overlap> = polygons.par_iter().flat_map_iter(of_polygon).collect();
+        let new: Vec<&Overlap> =
+            all.iter().filter(|o| !o.is_more(o.before_m2) && o.is_more(o.after_m2)).collect();
         Overlaps {
-            before: areas.iter().filter(|[before, _]| *before > SLIVER_M2).count(),
-            after: areas.iter().filter(|[_, after]| *after > SLIVER_M2).count(),
+            before: all.iter().filter(|o| o.is_more(o.before_m2)).count(),
+            after: all.iter().filter(|o| o.is_more(o.after_m2)).count(),
             new: new.len(),
-            new_area_m2: new.iter().fold(0.0, |sum, area| sum + area),
+            new_area_m2: new.iter().fold(0.0, |sum, o| sum + o.after_m2 - o.before_m2),
+            new_slivers: all.iter().filter(|o| o.before_m2 == 0.0 && o.is_sliver(o.after_m2)).count(),
         }
     }
 
@@ -73,13 +74,14 @@ impl Pairs {
         self.features.par_iter().enumerate().filter_map(polygon).collect()
     }
 
-    /// The area that a polygon has in common with each of some others, before and after, square metres.
-    fn common_areas(&self, polygon: u32, others: &[u32]) -> Vec<[f64; 2]> {
+    /// What a polygon has in common with each of some others.
+    fn common_areas(&self, polygon: u32, others: &[u32]) -> Vec<Overlap> {
         if others.is_empty() {
             return Vec::new();
         }
         let pair = &self.features[polygon as usize];
         let [x, y] = self.scale(&pair.before);
+        let sliver_m2 = SLIVER_M2.max(self.grid * self.grid * x * y);
         let (before, after) = (geometry(&pair.before), geometry(&pair.after));
         let common = |a: &Option<Geometry>, b: &FeatureGeometry| {
             let (Some(a), Some(b)) = (a, geometry(b)) else { return 0.0 };
@@ -87,9 +89,28 @@ impl Pairs {
         };
         let each = |other: &u32| {
             let other = &self.features[*other as usize];
-            [common(&before, &other.before), common(&after, &other.after)]
+            let (before_m2, after_m2) = (common(&before, &other.before), common(&after, &other.after));
+            Overlap { before_m2, after_m2, sliver_m2 }
         };
         others.iter().map(each).collect()
+    }
+}
+
+/// The area that two polygons have in common, square metres.
+struct Overlap {
+    before_m2: f64,
+    after_m2: f64,
+    /// Up to this, it is rounding.
+    sliver_m2: f64,
+}
+
+impl Overlap {
+    fn is_more(&self, area_m2: f64) -> bool {
+        area_m2 > self.sliver_m2
+    }
+
+    fn is_sliver(&self, area_m2: f64) -> bool {
+        area_m2 > 0.0 && !self.is_more(area_m2)
     }
 }
 
@@ -150,4 +171,33 @@ fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], ground: &Ground) -> f64 {
         (ex * py - ey * px).abs() / ex.hypot(ey)
     };
     height(a, b, c).min(height(a, b, d)).min(height(c, d, a)).min(height(c, d, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rectangle(from: f64, to: f64) -> FeatureGeometry {
+        let ring = vec![[from, 0.0], [to, 0.0], [to, 1.0], [from, 1.0], [from, 0.0]];
+        let text: Vec<String> = ring.iter().map(|[x, y]| format!("{x} {y}")).collect();
+        let geometry = Geometry::from_wkt(&format!("POLYGON (({}))", text.join(", "))).unwrap();
+        let wkb = geometry.wkb().unwrap();
+        FeatureGeometry { layer: "plots".into(), fid: None, wkb, chains: vec![ring] }
+    }
+
+    #[test]
+    fn an_overlap_up_to_a_cell_of_the_grid_is_a_sliver() {
+        let pair = |before: [f64; 2], after: [f64; 2]| Pair {
+            before: rectangle(before[0], before[1]),
+            after: rectangle(after[0], after[1]),
+        };
+        let overlaps = |grid: f64| {
+            let features = vec![pair([0.0, 1.0], [0.0, 1.005]), pair([1.0, 2.0], [1.0, 2.0])];
+            Pairs { features, ground: Ground::Plane { metres_per_unit: 1.0 }, grid }.overlaps()
+        };
+        assert_eq!((overlaps(0.0).new, overlaps(0.0).new_slivers), (1, 0));
+        assert!((overlaps(0.0).new_area_m2 - 0.005).abs() < 1e-9);
+        assert_eq!((overlaps(0.1).new, overlaps(0.1).new_slivers), (0, 1));
+        assert_eq!(overlaps(0.1).new_area_m2, 0.0);
+    }
 }

@@ -1,0 +1,148 @@
+//! What marking does to a map, in figures.
+
+use crate::{ground::Ground, map::Map, vertices::VertexTable};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// An angle is right, or kept, within this many degrees.
+const RIGHT_DEG: f64 = 1.0;
+
+/// Of many values; zeros for none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)] // the names say it
+pub struct Spread {
+    pub mean: f64,
+    pub root_mean_square: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of these values, none of them NaN.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.par_sort_unstable_by(f64::total_cmp);
+        let count = values.len().max(1) as f64;
+        let at =
+            |percent: usize| values.len().checked_sub(1).map_or(0.0, |last| values[last * percent / 100]);
+        Spread {
+            mean: values.iter().sum::<f64>() / count,
+            root_mean_square: (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
+            p99: at(99),
+            max: at(100),
+        }
+    }
+}
+
+/// How far the vertices moved, metres on the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Displacement {
+    /// Root mean square.
+    pub rms_m: f64,
+    /// 99th percentile.
+    pub p99_m: f64,
+    /// The largest.
+    pub max_m: f64,
+}
+
+impl Displacement {
+    /// From the vertices of a map to where they are now, in canonical order.
+    pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], ground: &Ground) -> Self {
+        let metres = |(from, to): (&[f64; 2], &[f64; 2])| {
+            let [dx, dy] = ground.metres_between(*from, *to);
+            dx.hypot(dy)
+        };
+        let spread = Spread::of(vertices.coords().iter().zip(moved).map(metres).collect());
+        Displacement { rms_m: spread.root_mean_square, p99_m: spread.p99, max_m: spread.max }
+    }
+}
+
+/// How much angles between segments changed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AngleChange {
+    /// How many angles.
+    pub count: usize,
+    /// Mean change, degrees.
+    pub mean_change_deg: f64,
+    /// 99th percentile, degrees.
+    pub p99_change_deg: f64,
+    /// Those that were within 1° of a right one.
+    pub right_angles: usize,
+    /// The share of these that changed by 1° at most; 1 when there is none.
+    pub right_angles_kept: f64,
+}
+
+impl AngleChange {
+    /// Of angles before and after, degrees from 0 to 360.
+    pub fn of(angles: &[[f64; 2]]) -> Self {
+        let change = |[before, after]: &[f64; 2]| (after - before).abs().min(360.0 - (after - before).abs());
+        let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
+        let right: Vec<&[f64; 2]> = angles.iter().filter(|[before, _]| is_right(*before)).collect();
+        let kept = right.iter().filter(|angle| change(angle) <= RIGHT_DEG).count();
+        let spread = Spread::of(angles.iter().map(change).collect());
+        AngleChange {
+            count: angles.len(),
+            mean_change_deg: spread.mean,
+            p99_change_deg: spread.p99,
+            right_angles: right.len(),
+            right_angles_kept: if right.is_empty() { 1.0 } else { kept as f64 / right.len() as f64 },
+        }
+    }
+
+    /// Of the vertices of a map at which two segments meet and no more, from their places in it to those in `moved`.
+    pub fn at_corners(map: &Map, moved: &[[f64; 2]]) -> Self {
+        let mut ends: Vec<[u32; 2]> = map.segments.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
+        ends.par_sort_unstable();
+        let corners: Vec<&[[u32; 2]]> = ends.chunk_by(|a, b| a[0] == b[0]).filter(|c| c.len() == 2).collect();
+        let angles = |corner: &&[[u32; 2]]| {
+            let [from, at, to] = [corner[0][1], corner[0][0], corner[1][1]];
+            let scale = map.ground.metres_per_unit(map.at(at));
+            let angle = |coords: &[[f64; 2]]| {
+                let [from, at, to] = [from, at, to].map(|v| coords[v as usize]);
+                angle_deg(from, at, to, scale)
+            };
+            Some([angle(map.vertices.coords())?, angle(moved)?])
+        };
+        Self::of(&corners.par_iter().filter_map(angles).collect::<Vec<_>>())
+    }
+}
+
+/// The angle from the way back to the way on, turning left, degrees from 0 to 360; `scale` is metres per unit.
+/// `None` where either has no length.
+pub fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Option<f64> {
+    let direction = |p: [f64; 2]| {
+        let [x, y] = [0, 1].map(|i| (p[i] - at[i]) * scale[i]);
+        (x != 0.0 || y != 0.0).then(|| y.atan2(x))
+    };
+    Some((direction(from)? - direction(to)?).to_degrees().rem_euclid(360.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_corner_has_two_segments_and_is_measured_on_the_ground() {
+        // A path along three sides of a rectangle, and a fork at its end.
+        let coords = vec![[0.0, 0.0], [0.0, 4.0], [2.0, 0.0], [2.0, 4.0], [3.0, 4.0], [3.0, 5.0]];
+        let vertices = VertexTable::new(coords.clone()).unwrap();
+        let segments = [[0, 1], [0, 2], [2, 3], [3, 4], [3, 5]];
+        let ground = Ground::Plane { metres_per_unit: 1.0 };
+        let map = Map { segments: &segments, ..Map::of_points(&vertices, ground) };
+        let still = AngleChange::at_corners(&map, &coords);
+        assert_eq!((still.count, still.right_angles, still.right_angles_kept), (2, 2, 1.0));
+        assert_eq!((still.mean_change_deg, still.p99_change_deg), (0.0, 0.0));
+        let mut moved = coords;
+        moved[1] = [4.0, 4.0]; // half of a right angle
+        let bent = AngleChange::at_corners(&map, &moved);
+        assert!((bent.mean_change_deg - 22.5).abs() < 1e-9 && bent.right_angles_kept == 0.5, "{bent:?}");
+    }
+
+    #[test]
+    fn a_full_turn_is_no_change() {
+        let change = AngleChange::of(&[[359.5, 0.5]]);
+        assert!((change.mean_change_deg - 1.0).abs() < 1e-9);
+    }
+}
