@@ -65,10 +65,10 @@ fn run_all(arguments: Arguments) -> Result<()> {
     };
     let product = product.with_options(arguments.option);
     let (quick, rows) = (arguments.quick, arguments.rows.clone());
-    let wanted = move |case: &Case, profile: Profile| match rows.is_empty() {
+    let wanted = move |case: &Case, profile: Profile| {
         // The paper's two chip rates on its own rows; on all others the default and the coded message.
-        true => case.table() == Table::Paper || (!quick && profile != Profile::repetition(3)),
-        false => rows.contains(&case.id()),
+        let is_measured = case.table() == Table::Paper || (!quick && profile != Profile::repetition(3));
+        is_measured && (rows.is_empty() || rows.contains(&case.id()))
     };
     let plan = Plan {
         maps: geopackages(&arguments.maps)?,
