@@ -107,6 +107,11 @@ pub enum Error {
          choose a format that keeps more digits"
     )]
     MessageUnreadable { errors: usize, bits: usize },
+    #[error(
+        "the whole map is {size_m:.1e} m wide, and the mark moves vertices by up to TOLERANCE={tolerance_m} m: if the \
+         units are not those of its CRS, correct that (SRS, -a_srs), else lower TOLERANCE and AMPLITUDE"
+    )]
+    TooSmall { size_m: f64, tolerance_m: f64 },
     #[error(transparent)]
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]
