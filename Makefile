@@ -12,7 +12,7 @@ BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults quality conformance install uninstall fixtures deps lint
+.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts install uninstall fixtures deps lint
 
 build: deps
 	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
@@ -51,6 +51,10 @@ faults: build
 
 conformance: build
 	host-tests/conformance/run.sh
+
+# A PostGIS of its own, started and stopped; installs PostgreSQL.
+hosts: build
+	host-tests/hosts/postgis.sh
 
 fixtures:
 	fixtures/make_fixtures.sh

@@ -46,6 +46,7 @@ fn every_format_gets_what_its_own_driver_writes_but_for_the_coordinates() {
     for (format, target, native) in [
         ("GPKG", "out.gpkg", "native.gpkg"),
         ("ESRI Shapefile", "out.shp", "native.shp"),
+        ("ESRI Shapefile", "out.shz", "native.shz"),
         ("FlatGeobuf", "out.fgb", "native.fgb"),
         ("GeoJSON", "out.geojson", "native.geojson"),
     ] {
@@ -267,7 +268,7 @@ fn only_files_are_written() {
     refuse("folder", &["-dsco", "FORMAT=ESRI Shapefile"], &["folder is a folder"]);
     refuse("nowhere/out.gpkg", &[], &["nowhere/out.gpkg", "in no folder that exists"]);
     refuse("/vsimem/out.gpkg", &[], &["/vsimem/out.gpkg", "virtual file"]);
-    refuse("PG:dbname=map", &[], &["extension \"\"", "use FORMAT="]);
+    refuse("PG:dbname=map", &[], &["a name without extension", "write a GPKG"]);
     refuse("PG:dbname=map", &["-dsco", "FORMAT=PostgreSQL"], &["FORMAT=PostgreSQL", "GPKG"]);
     refuse("out.xyz", &[], &["extension \"xyz\""]);
     refuse("out.shp", &[], &["ESRI Shapefile holds one layer"]);

@@ -80,7 +80,7 @@ fn a_disk_that_is_full_at_any_call_fails_without_a_trace() {
 
 #[test]
 fn a_file_that_cannot_grow_fails_without_a_trace_in_every_format() {
-    for target in ["out.gpkg", "out.shp", "out.geojson", "out.fgb"] {
+    for target in ["out.gpkg", "out.shp", "out.shz", "out.geojson", "out.fgb"] {
         let scene = Scene::new(target, false);
         scene.count_calls();
         let largest = scene.host.files().into_iter().map(|(_, bytes)| bytes.len()).max().unwrap();

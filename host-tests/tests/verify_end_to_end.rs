@@ -19,26 +19,6 @@ fn marked(fixture: &str, options: &[&str]) -> Host {
 }
 
 #[test]
-fn the_message_is_read_from_every_common_format() {
-    for (format, output) in [
-        ("GPKG", "marked.gpkg"),
-        ("ESRI Shapefile", "marked"),
-        ("GeoJSON", "marked.geojson"),
-        ("FlatGeobuf", "marked.fgb"),
-    ] {
-        let host = Host::new();
-        host.copy("kotka.gpkg", "map.gpkg");
-        // GeoJSON and a FlatGeobuf file hold one layer.
-        let one_layer = ["-oo", "LAYERS=buildings", "-oo", "RECORD=acme.json", "buildings"];
-        let all = ["-oo", "RECORD=acme.json"];
-        let options: &[&str] =
-            if output.contains(".geojson") || output.contains(".fgb") { &one_layer } else { &all };
-        host.mark(format, output, "map.gpkg", options).succeeds();
-        host.matches("map.gpkg", &["--record", "acme.json", output]);
-    }
-}
-
-#[test]
 fn the_message_is_read_without_a_record() {
     let host = marked("helsinki.gpkg", &["-oo", "CHIP_RATE=3", "-oo", "AMPLITUDE=0.15"]);
     let how = ["--chip-rate", "3", "--amplitude", "0.15"];

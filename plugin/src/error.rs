@@ -77,10 +77,18 @@ pub enum Error {
     SameFile { option: &'static str, other: &'static str },
     #[error("REFERENCE={0} is written as GeoPackage: give it a name that ends in .gpkg")]
     ReferenceNotGeoPackage(String),
-    #[error("{what} is not a format that a marked map is written to: use FORMAT= {known}")]
+    #[error(
+        "{what} is not a format that a marked map is written to, only {known} are: write a GPKG and convert it, or \
+         mark by reading (ogr2ogr -f <format> <target> MESHMARK:<source>); both keep the mark"
+    )]
     UnknownFormat { what: String, known: String },
     #[error("{driver} holds one layer, and this is the second: choose one, or write a GeoPackage")]
     OneLayer { driver: &'static str },
+    #[error(
+        "layer \"{layer}\" is not in WGS 84, into which {driver} would bring it after it was marked: add -t_srs \
+         EPSG:4326"
+    )]
+    NotWgs84 { driver: &'static str, layer: String },
     #[error("{driver} would make a folder of it: write one layer, or a GeoPackage")]
     Folder { driver: &'static str },
     #[error("{what} failed: {reason}")]
@@ -99,6 +107,11 @@ pub enum Error {
          choose a format that keeps more digits"
     )]
     MessageUnreadable { errors: usize, bits: usize },
+    #[error(
+        "the whole map is {size_m:.1e} m wide, and the mark moves vertices by up to TOLERANCE={tolerance_m} m: if the \
+         units are not those of its CRS, correct that (SRS, -a_srs), else lower TOLERANCE and AMPLITUDE"
+    )]
+    TooSmall { size_m: f64, tolerance_m: f64 },
     #[error(transparent)]
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]

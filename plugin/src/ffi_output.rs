@@ -50,6 +50,23 @@ impl LayerSpec {
         LayerSpec { name, geometry, options, srs }
     }
 
+    /// Whether coordinates are longitudes and latitudes of WGS 84, or nobody knows.
+    pub fn is_wgs84(&self) -> bool {
+        // The order of the axes is that of the host's coordinates in any case: x is the longitude.
+        let criterion = c"CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS";
+        let axes = c"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES";
+        let options = [criterion.as_ptr(), axes.as_ptr(), ptr::null()];
+        // SAFETY: ours is null or a reference, the other one is made and released here; the list ends in null.
+        unsafe {
+            let wgs84 = gdal_sys::OSRNewSpatialReference(ptr::null());
+            gdal_sys::OSRSetWellKnownGeogCS(wgs84, c"WGS84".as_ptr());
+            let is_same =
+                self.srs.0.is_null() || gdal_sys::OSRIsSameEx(self.srs.0, wgs84, options.as_ptr()) != 0;
+            gdal_sys::OSRRelease(wgs84);
+            is_same
+        }
+    }
+
     /// The same layer with other options.
     pub fn with_options(&self, options: Vec<(String, String)>) -> Self {
         // SAFETY: the spatial reference is null or ours.

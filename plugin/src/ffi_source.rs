@@ -43,9 +43,12 @@ impl OwnedSource {
         let flags = GdalOpenFlags::GDAL_OF_VECTOR
             | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR
             | GdalOpenFlags::GDAL_OF_INTERNAL;
-        // SAFETY: the name is a C string; null lists mean all drivers and no options.
+        // CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked. With @ the
+        // option concerns only drivers that know it.
+        let options = [c"@KEEP_GEOM_COLUMNS=NO".as_ptr(), ptr::null()];
+        // SAFETY: the name is a C string; null lists mean all drivers and no sibling files, the options end in null.
         let handle = unsafe {
-            gdal_sys::GDALOpenEx(c_name.as_ptr(), flags.bits(), ptr::null(), ptr::null(), ptr::null())
+            gdal_sys::GDALOpenEx(c_name.as_ptr(), flags.bits(), ptr::null(), options.as_ptr(), ptr::null())
         };
         if handle.is_null() {
             let reason = collector.first_failure();

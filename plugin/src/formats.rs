@@ -8,61 +8,94 @@ use std::path::Path;
 pub struct Format {
     /// GDAL's short name.
     pub driver: &'static str,
-    /// Of the file that bears the target's name, lower case.
-    extensions: &'static [&'static str],
+    /// How the name of the file ends that bears the target's name, lower case.
+    endings: &'static [&'static str],
     /// Whether a file holds several layers.
     pub many_layers: bool,
-    rounding: Rounding,
+    coordinates: Coordinates,
 }
 
+/// How coordinates are written.
 #[derive(Debug)]
-enum Rounding {
-    /// Coordinates are kept bit by bit.
-    None,
-    /// Coordinates are written as decimal numbers; how many digits after the point an option of the layer says.
-    Decimals { option: &'static str, default: i32 },
+enum Coordinates {
+    /// Bit by bit.
+    Binary,
+    /// As decimal numbers; RFC 7946 allows longitudes and latitudes of WGS 84 only.
+    Json { always_rfc7946: bool },
 }
 
 const FORMATS: &[Format] = &[
-    Format { driver: "GPKG", extensions: &["gpkg"], many_layers: true, rounding: Rounding::None },
-    Format { driver: "ESRI Shapefile", extensions: &["shp"], many_layers: false, rounding: Rounding::None },
-    Format { driver: "FlatGeobuf", extensions: &["fgb"], many_layers: false, rounding: Rounding::None },
+    Format { driver: "GPKG", endings: &[".gpkg"], many_layers: true, coordinates: Coordinates::Binary },
+    Format {
+        driver: "ESRI Shapefile",
+        endings: &[".shp", ".shz", ".shp.zip"],
+        many_layers: false,
+        coordinates: Coordinates::Binary,
+    },
+    Format { driver: "FlatGeobuf", endings: &[".fgb"], many_layers: false, coordinates: Coordinates::Binary },
     Format {
         driver: "GeoJSON",
-        extensions: &["geojson", "json"],
+        endings: &[".geojson", ".json"],
         many_layers: false,
-        rounding: Rounding::Decimals { option: "COORDINATE_PRECISION", default: 15 },
+        coordinates: Coordinates::Json { always_rfc7946: false },
+    },
+    Format {
+        driver: "GeoJSONSeq",
+        endings: &[".geojsonl", ".geojsons"],
+        many_layers: false,
+        coordinates: Coordinates::Json { always_rfc7946: true },
     },
 ];
 
+type Options<'a> = &'a [(String, String)];
+
 impl Format {
-    /// The format that a user names, or that of the target's extension.
+    /// The format that a user names, or that of the target's name.
     pub fn find(named: Option<&str>, target: &Path) -> Result<&'static Format> {
-        let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let found = match named {
-            Some(name) => FORMATS.iter().find(|format| format.driver.eq_ignore_ascii_case(name)),
-            None => FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str())),
+        let target_name = target.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        let is_meant = |format: &&Format| match named {
+            Some(name) => format.driver.eq_ignore_ascii_case(name),
+            None => format.endings.iter().any(|ending| target_name.ends_with(ending)),
         };
-        found.ok_or_else(|| {
+        FORMATS.iter().find(is_meant).ok_or_else(|| {
             let known: Vec<_> = FORMATS.iter().map(|format| format.driver).collect();
-            let what =
-                named.map_or_else(|| format!("extension \"{extension}\""), |name| format!("FORMAT={name}"));
+            let what = match (named, target.extension()) {
+                (Some(name), _) => format!("FORMAT={name}"),
+                (None, Some(extension)) => format!("extension \"{}\"", extension.to_string_lossy()),
+                (None, None) => "a name without extension".into(),
+            };
             Error::UnknownFormat { what, known: known.join(", ") }
         })
     }
 
-    /// How far a coordinate of this size may be from what was written, CRS units; zero where every bit is kept.
-    pub fn tolerance(&self, layer_options: &[(String, String)], magnitude: f64) -> f64 {
-        match self.rounding {
-            Rounding::None => 0.0,
-            Rounding::Decimals { option, default } => {
-                let given = layer_options.iter().find(|(name, _)| name.eq_ignore_ascii_case(option));
-                let digits = given.and_then(|(_, value)| value.trim().parse().ok()).unwrap_or(default);
-                // The last bits go in the conversion to decimal digits and back.
-                0.5 * 10f64.powi(-digits) * (1.0 + 1e-6) + 4.0 * f64::EPSILON * magnitude
+    /// Whether the driver brings a layer with these options into WGS 84, which would happen after the marking.
+    pub fn is_wgs84_only(&self, layer_options: Options) -> bool {
+        match self.coordinates {
+            Coordinates::Binary => false,
+            Coordinates::Json { always_rfc7946: true } => true,
+            Coordinates::Json { always_rfc7946: false } => {
+                let is_no =
+                    |text: &str| ["NO", "FALSE", "OFF", "0"].iter().any(|no| no.eq_ignore_ascii_case(text));
+                value(layer_options, "RFC7946").is_some_and(|text| !is_no(text))
             }
         }
     }
+
+    /// How far a coordinate of this size may be from what was written, CRS units; zero where every bit is kept.
+    pub fn tolerance(&self, layer_options: Options, magnitude: f64) -> f64 {
+        if let Coordinates::Binary = self.coordinates {
+            return 0.0;
+        }
+        let given = value(layer_options, "COORDINATE_PRECISION").and_then(|text| text.parse().ok());
+        let digits: i32 = given.unwrap_or(if self.is_wgs84_only(layer_options) { 7 } else { 15 });
+        // The last bits go in the conversion to decimal digits and back.
+        0.5 * 10f64.powi(-digits) * (1.0 + 1e-6) + 4.0 * f64::EPSILON * magnitude
+    }
+}
+
+fn value<'a>(options: Options<'a>, name: &str) -> Option<&'a str> {
+    let given = options.iter().find(|(option, _)| option.eq_ignore_ascii_case(name));
+    given.map(|(_, value)| value.trim())
 }
 
 #[cfg(test)]
@@ -70,22 +103,41 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_extension_decides_unless_a_format_is_named() {
+    fn the_name_decides_unless_a_format_is_named() {
         let driver = |named, path| Format::find(named, Path::new(path)).map(|f| f.driver);
         assert_eq!(driver(None, "a/b.GPKG").unwrap(), "GPKG");
         assert_eq!(driver(None, "b.json").unwrap(), "GeoJSON");
+        assert_eq!(driver(None, "b.shp.zip").unwrap(), "ESRI Shapefile");
         assert_eq!(driver(Some("flatgeobuf"), "b.gpkg").unwrap(), "FlatGeobuf");
-        let error = driver(None, "folder").unwrap_err().to_string();
-        assert!(error.contains("extension \"\"") && error.contains("ESRI Shapefile"), "{error}");
-        assert!(driver(Some("PDF"), "a.gpkg").unwrap_err().to_string().contains("FORMAT=PDF"));
+        let refused = |named, path| driver(named, path).unwrap_err().to_string();
+        assert!(refused(None, "folder").contains("without extension"));
+        assert!(refused(None, "b.zip").contains("extension \"zip\""));
+        let error = refused(Some("PDF"), "a.gpkg");
+        assert!(error.contains("FORMAT=PDF") && error.contains("ESRI Shapefile"), "{error}");
+    }
+
+    fn options(name: &str, value: &str) -> [(String, String); 1] {
+        [(name.to_string(), value.to_string())]
     }
 
     #[test]
     fn digits_after_the_point_are_those_of_the_layer_option() {
         let format = Format::find(Some("GeoJSON"), Path::new("")).unwrap();
-        let options = [("coordinate_precision".to_string(), "2".to_string())];
-        assert!((format.tolerance(&options, 0.0) - 0.005).abs() < 1e-6);
+        let two = options("coordinate_precision", "2");
+        assert!((format.tolerance(&two, 0.0) - 0.005).abs() < 1e-6);
         assert!(format.tolerance(&[], 1e6) < 1e-8);
-        assert_eq!(Format::find(Some("GPKG"), Path::new("")).unwrap().tolerance(&options, 1e6), 0.0);
+        assert!((format.tolerance(&options("RFC7946", "YES"), 0.0) - 5e-8).abs() < 1e-12);
+        assert_eq!(Format::find(Some("GPKG"), Path::new("")).unwrap().tolerance(&two, 1e6), 0.0);
+    }
+
+    #[test]
+    fn rfc_7946_is_said_or_the_format_itself() {
+        let is_wgs84_only = |driver, options: &[(String, String)]| {
+            Format::find(Some(driver), Path::new("")).unwrap().is_wgs84_only(options)
+        };
+        assert!(is_wgs84_only("GeoJSONSeq", &[]));
+        assert!(is_wgs84_only("GeoJSON", &options("rfc7946", "yes")));
+        assert!(!is_wgs84_only("GeoJSON", &options("RFC7946", "no")) && !is_wgs84_only("GeoJSON", &[]));
+        assert!(!is_wgs84_only("GPKG", &options("RFC7946", "YES")));
     }
 }

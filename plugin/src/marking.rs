@@ -5,12 +5,13 @@ use crate::{
     output, record_file,
     source_files::{SourceFiles, same_file},
 };
-use gdal::Dataset;
+use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::{
     carrier::Carrier,
     demodulation,
     embedding::{self, Marked},
     key::SecretKey,
+    map::Map,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Subject},
     patches::Patches,
@@ -125,11 +126,13 @@ impl Marking {
         let map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map()?;
+        check_extent(&on_ground, &options.parameters)?;
         let message = request.subject.message(&request.key);
         let marked = pool(threads)?
             .install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
         let record = record(request, &map, &marked).to_json();
-        let warnings = warnings(&options.parameters, &message, &map, &marked);
+        let mut warnings = warnings(&options.parameters, &message, &map, &marked);
+        warnings.extend(coordinates_as_text(source.dataset));
         Ok(Marking {
             name: source.name,
             map,
@@ -235,6 +238,20 @@ fn check_record_is_no_source(options: &Options, files: &SourceFiles) -> Result<(
     }
 }
 
+/// Smaller than so many tolerances a map would be noise after its marking.
+const LEAST_TOLERANCES: f64 = 10.0;
+
+fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
+    let (min, max) = map.vertices.bounds();
+    let [width_m, height_m] = map.ground.metres_between(min, max);
+    let size_m = width_m.max(height_m);
+    let tolerance_m = parameters.tolerance_m;
+    match map.vertices.len() > 1 && size_m < LEAST_TOLERANCES * tolerance_m {
+        true => Err(Error::TooSmall { size_m, tolerance_m }),
+        false => Ok(()),
+    }
+}
+
 /// What is legal and probably not meant.
 fn warnings(parameters: &Parameters, message: &Message, map: &Survey, marked: &Marked) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -261,6 +278,18 @@ fn warnings(parameters: &Parameters, message: &Message, map: &Survey, marked: &M
         ));
     }
     warnings
+}
+
+/// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
+fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
+    let mut layers = dataset.layers();
+    let layer =
+        layers.find(|layer| layer.defn().fields().any(|field| field.name().eq_ignore_ascii_case("WKT")))?;
+    Some(format!(
+        "layer \"{}\" has an attribute \"WKT\", which stays as it is: if it holds the coordinates, anybody can undo the \
+         mark; leave it out, for example with -select, or open a CSV file with KEEP_GEOM_COLUMNS=NO",
+        layer.name()
+    ))
 }
 
 fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {

@@ -13,7 +13,7 @@ use crate::{
 };
 use gdal::{
     Dataset, DatasetOptions, GdalOpenFlags,
-    vector::{Feature, LayerAccess},
+    vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::vertices::VertexTable;
 use meshmark_dataset::wkb::{self, WkbError};
@@ -54,7 +54,12 @@ pub fn check(written: &Written, view: &View, request: &Request, threads: usize) 
         let tolerance = written.format.tolerance(&layer.options, magnitude);
         let keep = view.marking().marks_layer(&layer.staged).then_some(&mut vertices);
         let comparison = Comparison { tolerance, failed: &|d: &str| not_kept(written, layer, d) };
-        comparison.layers(&meant, &layer.staged, &file, &layer.name, keep)?;
+        // The only layer of a file may bear the file's name.
+        let in_file = match written.format.many_layers {
+            true => file.layer_by_name(&layer.name),
+            false => file.layer(0),
+        };
+        comparison.layers(meant.layer_by_name(&layer.staged), in_file, keep)?;
         widest = widest.max(tolerance);
     }
     let found = find_all(view.marking().moved(), vertices, widest);
@@ -88,15 +93,13 @@ impl Comparison<'_> {
     /// Compares two layers; the coordinates of the second are added to `keep`.
     fn layers(
         &self,
-        meant: &Dataset,
-        meant_name: &str,
-        file: &Dataset,
-        name: &str,
+        meant: gdal::errors::Result<Layer>,
+        in_file: gdal::errors::Result<Layer>,
         mut keep: Option<&mut Vec<[f64; 2]>>,
     ) -> Result<()> {
         let collector = Collector::new();
-        let mut one = meant.layer_by_name(meant_name).map_err(|_| (self.failed)("the layer is missing"))?;
-        let mut other = file.layer_by_name(name).map_err(|_| (self.failed)("the layer is missing"))?;
+        let mut one = meant.map_err(|_| (self.failed)("the layer is missing"))?;
+        let mut other = in_file.map_err(|_| (self.failed)("the layer is missing"))?;
         one.reset_feature_reading(); // it was read to its end when it was written
         let (mut one, mut other) = (one.features(), other.features());
         let mut sums = [0u64; 2];

@@ -82,6 +82,9 @@ impl Writer {
             if !writer.layers.is_empty() && !format.many_layers {
                 return Err(Error::OneLayer { driver: format.driver });
             }
+            if format.is_wgs84_only(&spec.options) && !spec.is_wgs84() {
+                return Err(Error::NotWgs84 { driver: format.driver, layer: spec.name });
+            }
             writer.schema.add_layer(&spec, false)?;
             let number = writer.layers.len();
             let [_, id, geometry] = writer.schema.names(number);

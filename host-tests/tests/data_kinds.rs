@@ -1,0 +1,294 @@
+//! Data of every kind: each is marked by reading and by writing and verifies, or is refused with a sentence.
+
+use gdal::{
+    Dataset, DatasetOptions, DriverManager, GdalOpenFlags,
+    spatial_ref::SpatialRef,
+    vector::{
+        FieldDefn, Geometry, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType, sql::Dialect,
+    },
+};
+use meshmark_host_tests::{
+    contents::{self, lengths, moves},
+    plugin::Host,
+};
+
+/// A map of one layer.
+struct Map {
+    file: &'static str,
+    layer: &'static str,
+    srs: &'static str,
+    /// Well-known texts; an empty one is a null geometry.
+    features: Vec<String>,
+    /// What the field `名称` of every feature is set to.
+    name: &'static str,
+    first_fid: i64,
+}
+
+impl Map {
+    fn new(srs: &'static str, features: Vec<String>) -> Self {
+        Map { file: "map.gpkg", layer: "map", srs, features, name: "", first_fid: 1 }
+    }
+
+    fn write(&self, host: &Host) {
+        let path = host.path(self.file);
+        let mut dataset =
+            DriverManager::get_driver_by_name("GPKG").unwrap().create_vector_only(&path).unwrap();
+        let srs = SpatialRef::from_definition(self.srs).unwrap();
+        let mut transaction = dataset.start_transaction().unwrap();
+        let ty = OGRwkbGeometryType::wkbUnknown;
+        let options = LayerOptions { name: self.layer, srs: Some(&srs), ty, options: None };
+        let layer = transaction.create_layer(options).unwrap();
+        FieldDefn::new("名称", OGRFieldType::OFTString).unwrap().add_to_layer(&layer).unwrap();
+        for wkt in &self.features {
+            let mut feature = gdal::vector::Feature::new(layer.defn()).unwrap();
+            if !wkt.is_empty() {
+                feature.set_geometry(Geometry::from_wkt(wkt).unwrap()).unwrap();
+            }
+            feature.set_field_string(0, self.name).unwrap();
+            feature.create(&layer).unwrap();
+        }
+        transaction.commit().unwrap();
+        dataset.close().unwrap();
+        self.number(&path);
+    }
+
+    fn number(&self, path: &std::path::Path) {
+        let open_flags = GdalOpenFlags::GDAL_OF_UPDATE | GdalOpenFlags::GDAL_OF_VECTOR;
+        let dataset = Dataset::open_ex(path, DatasetOptions { open_flags, ..Default::default() }).unwrap();
+        let sql = format!("UPDATE \"{}\" SET fid = fid + {}", self.layer, self.first_fid - 1);
+        dataset.execute_sql(sql, None, Dialect::DEFAULT).unwrap();
+        dataset.close().unwrap();
+    }
+}
+
+/// Marks by reading and by writing, which makes one and the same map, verifies both, and returns the RMS length
+/// of the moves in CRS units.
+#[track_caller]
+fn marks(map: &Map) -> f64 {
+    let host = Host::new();
+    map.write(&host);
+    let before = contents::read(&host.path(map.file));
+    host.mark("GPKG", "read.gpkg", map.file, &["-oo", "RECORD=read.json"]).succeeds();
+    host.matches(map.file, &["--record", "read.json", "read.gpkg"]);
+    let read = contents::read(&host.path("read.gpkg"));
+    let (rms, _) = lengths(&moves(&before, &read)); // ids, attributes, Z, M and structure stay
+    host.create("out.gpkg", map.file, &[]).succeeds();
+    host.matches("ref.gpkg", &["--record", "record.json", "out.gpkg"]);
+    assert!(contents::read(&host.path("out.gpkg")) == read);
+    assert!(contents::read(&host.path("ref.gpkg")) == before);
+    rms
+}
+
+/// Asserts that both sides refuse the map with these words, and write nothing.
+#[track_caller]
+fn refuses(map: &Map, words: &str) {
+    let host = Host::new();
+    map.write(&host);
+    let before = host.files();
+    let read = host.mark("GPKG", "read.gpkg", map.file, &["-oo", "RECORD=read.json"]);
+    let write = host.create("out.gpkg", map.file, &[]);
+    for run in [read, write] {
+        assert_eq!(run.code, Some(1), "{}", run.stderr);
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+    }
+    assert!(host.files() == before, "{:?}", host.names());
+}
+
+// --- maps ------------------------------------------------------------------------------------------
+
+/// A number in 0..1 that depends on nothing but `i`.
+fn scattered(i: usize) -> f64 {
+    (i as f64 * 0.618_033_988_749_894_9 + (i * i % 97) as f64 * 0.013).fract()
+}
+
+/// The corners of `count` houses along streets, metres east and north of the first.
+fn houses(count: usize) -> Vec<[[f64; 2]; 4]> {
+    let house = |i: usize| {
+        let (x, y) = ((i % 12) as f64 * 40.0, (i / 12) as f64 * 50.0);
+        let (width, depth) = (8.0 + 10.0 * scattered(i), 9.0 + 8.0 * scattered(i + 500));
+        let (sin, cos) = (scattered(i + 900) * 0.5).sin_cos();
+        [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]]
+            .map(|[u, v]| [x + u * cos - v * sin, y + u * sin + v * cos])
+    };
+    (0..count).map(house).collect()
+}
+
+/// Enough for the default patch.
+const MANY: usize = 240;
+
+type Place<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
+
+/// Moves and scales metres to the place of a map.
+fn at(origin: [f64; 2], scale: [f64; 2]) -> impl Fn([f64; 2]) -> [f64; 2] {
+    move |[x, y]| [origin[0] + x * scale[0], origin[1] + y * scale[1]]
+}
+
+/// The same in degrees at a place on the earth.
+fn degrees(lon: f64, lat: f64) -> impl Fn([f64; 2]) -> [f64; 2] {
+    at([lon, lat], [1.0 / (111_320.0 * lat.to_radians().cos()), 1.0 / 111_320.0])
+}
+
+fn list(points: &[[f64; 2]], place: Place, more: &str) -> String {
+    let text = |&point: &[f64; 2]| {
+        let [x, y] = place(point);
+        format!("{x:?} {y:?}{more}")
+    };
+    points.iter().map(text).collect::<Vec<_>>().join(",")
+}
+
+/// Houses as polygons.
+fn polygons(place: Place) -> Vec<String> {
+    houses(MANY)
+        .iter()
+        .map(|[a, b, c, d]| format!("POLYGON (({}))", list(&[*a, *b, *c, *d, *a], place, "")))
+        .collect()
+}
+
+/// Each house in this shape, where `{open}` stands for its corners and `{ring}` for those closed.
+fn shapes(template: &str, more: &str) -> Vec<String> {
+    let place = at([385_000.0, 6_671_000.0], [1.0, 1.0]);
+    let shape = |house: &[[f64; 2]; 4]| {
+        let ring = [&house[..], &house[..1]].concat();
+        template.replace("{ring}", &list(&ring, &place, more)).replace("{open}", &list(house, &place, more))
+    };
+    houses(MANY).iter().map(shape).collect()
+}
+
+// --- kinds -----------------------------------------------------------------------------------------
+
+#[test]
+fn every_geometry_type_with_and_without_z_and_m() {
+    for (template, more) in [
+        ("MULTIPOINT ({open})", ""),
+        ("MULTIPOLYGON Z ((({ring})))", " 12.5"),
+        ("LINESTRING M ({open})", " 7"),
+        ("MULTILINESTRING ZM (({open}))", " 12.5 7"),
+    ] {
+        let rms = marks(&Map::new("EPSG:3067", shapes(template, more)));
+        assert!((0.05..0.2).contains(&rms), "{template}: {rms} m");
+    }
+}
+
+#[test]
+fn surfaces_stay_surfaces() {
+    marks(&Map::new("EPSG:3067", triangles()));
+}
+
+fn triangles() -> Vec<String> {
+    let place = at([385_000.0, 6_671_000.0], [1.0, 1.0]);
+    let surface = |[a, b, c, d]: &[[f64; 2]; 4]| {
+        let triangle = |corners: [[f64; 2]; 4]| format!("(({}))", list(&corners, &place, " 3"));
+        format!("TIN Z ({}, {})", triangle([*a, *b, *c, *a]), triangle([*a, *c, *d, *a]))
+    };
+    houses(MANY).iter().map(surface).collect()
+}
+
+#[test]
+fn curves_stay_curves() {
+    let place = at([385_000.0, 6_671_000.0], [1.0, 1.0]);
+    let arc = |points: &[[f64; 2]]| format!("CIRCULARSTRING ({})", list(points, &place, ""));
+    let line = |[a, b, c, d]: &[[f64; 2]; 4]| {
+        format!("COMPOUNDCURVE ({}, ({}))", arc(&[*a, *b, *c]), list(&[*c, *d], &place, ""))
+    };
+    let area = |[a, b, c, d]: &[[f64; 2]; 4]| format!("CURVEPOLYGON ({})", arc(&[*a, *b, *c, *d, *a]));
+    marks(&Map::new("EPSG:3067", houses(MANY).iter().map(line).collect()));
+    marks(&Map::new("EPSG:3067", houses(MANY).iter().map(area).collect()));
+}
+
+#[test]
+fn mixed_geometries_null_and_empty_ones_in_one_layer() {
+    let place = at([385_000.0, 6_671_000.0], [1.0, 1.0]);
+    let mixed = |(i, house): (usize, &[[f64; 2]; 4])| {
+        let ring = list(&[&house[..], &house[..1]].concat(), &place, "");
+        let open = list(house, &place, "");
+        match i % 6 {
+            0 => format!("POLYGON (({ring}))"),
+            1 => format!("LINESTRING ({open})"),
+            2 => format!("MULTIPOINT ({open})"),
+            3 => {
+                format!("GEOMETRYCOLLECTION (POLYGON (({ring})), POINT ({}))", list(&house[..1], &place, ""))
+            }
+            4 => "POLYGON EMPTY".into(),
+            _ => String::new(),
+        }
+    };
+    marks(&Map::new("EPSG:3067", houses(MANY + 120).iter().enumerate().map(mixed).collect()));
+}
+
+#[test]
+fn feet_are_moved_by_metres() {
+    let feet = 0.3048;
+    let rms = marks(&Map::new("EPSG:2263", polygons(&at([987_000.0, 211_000.0], [1.0 / feet, 1.0 / feet]))));
+    assert!((0.05..0.2).contains(&(rms * feet)), "{rms} feet");
+}
+
+#[test]
+fn coordinates_far_from_the_origin() {
+    for origin in [[1.5e7, -1.2e7], [-1e7, 9.9e6]] {
+        let rms = marks(&Map::new("EPSG:3857", polygons(&at(origin, [1.0, 1.0]))));
+        assert!(rms > 0.05, "{rms}");
+    }
+}
+
+#[test]
+fn polar_latitudes() {
+    marks(&Map::new("EPSG:4326", polygons(&degrees(15.0, 78.2))));
+    marks(&Map::new("EPSG:4326", polygons(&degrees(-40.0, 89.9))));
+    marks(&Map::new("EPSG:4326", polygons(&degrees(166.7, -77.85))));
+    marks(&Map::new("EPSG:3995", polygons(&at([-300.0, -400.0], [1.0, 1.0])))); // around the pole itself
+    marks(&Map::new("EPSG:3031", polygons(&at([300_000.0, -1_300_000.0], [1.0, 1.0]))));
+}
+
+#[test]
+fn both_sides_of_the_180th_meridian() {
+    // Half of the map on either side, as formats want it; and east of it in longitudes beyond 180.
+    let fiji = degrees(179.998, -16.8);
+    let wrapped = |point| {
+        let [lon, lat] = fiji(point);
+        [if lon > 180.0 { lon - 360.0 } else { lon }, lat]
+    };
+    let (east, west): (Vec<_>, Vec<_>) =
+        polygons(&wrapped).into_iter().partition(|wkt| wkt.contains("-179."));
+    let east: Vec<_> =
+        east.into_iter().filter(|wkt| !wkt.contains("(179.") && !wkt.contains(",179.")).collect();
+    assert!(east.len() > 50 && west.len() > 50);
+    let split = [east, west].concat();
+    marks(&Map::new("EPSG:4326", split));
+    marks(&Map::new("EPSG:4326", polygons(&fiji)));
+    marks(&Map::new("EPSG:3832", polygons(&at([3_339_000.0, -1_800_000.0], [1.0, 1.0]))));
+}
+
+#[test]
+fn names_in_any_script() {
+    let map = Map {
+        file: "Kartta – 地図 ñ.gpkg",
+        layer: "rakennukset ä 建物",
+        name: "Ελλάδα \u{1f5fa}",
+        ..Map::new("EPSG:3067", shapes("POLYGON (({ring}))", ""))
+    };
+    marks(&map);
+}
+
+#[test]
+fn ids_that_no_double_can_hold() {
+    for first_fid in [(1 << 53) - 100, i64::MAX - MANY as i64] {
+        marks(&Map { first_fid, ..Map::new("EPSG:3067", shapes("POLYGON (({ring}))", "")) });
+    }
+}
+
+#[test]
+fn one_feature_of_very_many_vertices_and_very_many_points() {
+    let corners: Vec<[f64; 2]> = houses(5_000).into_iter().flatten().collect();
+    let place = at([385_000.0, 6_671_000.0], [1.0, 1.0]);
+    marks(&Map::new("EPSG:3067", vec![format!("LINESTRING ({})", list(&corners, &place, ""))]));
+    let points = corners.iter().map(|corner| format!("POINT ({})", list(&[*corner], &place, ""))).collect();
+    marks(&Map::new("EPSG:3067", points));
+}
+
+#[test]
+fn a_map_smaller_than_its_mark_is_refused() {
+    for srs in ["EPSG:3067", "EPSG:4326"] {
+        let map = Map::new(srs, polygons(&at([0.0, 0.0], [1e-9, 1e-9])));
+        refuses(&map, "lower TOLERANCE and AMPLITUDE");
+    }
+}

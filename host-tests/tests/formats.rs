@@ -1,0 +1,184 @@
+//! Every format there is a use for, end to end: marked by GDAL's own programs, read by `meshmark verify`.
+
+use meshmark_host_tests::plugin::{Host, fixture};
+use std::fs;
+
+fn kotka() -> String {
+    fixture("kotka.gpkg").display().to_string()
+}
+
+/// A layer without attributes, for formats with a fixed set of them.
+const BARE: [&str; 2] = ["-sql", "SELECT geom FROM buildings"];
+const LAYER: [&str; 1] = ["buildings"];
+
+// --- reading ---------------------------------------------------------------------------------------
+
+/// A map in one format, made from a GeoPackage, marked by reading into the same format.
+struct Read {
+    format: &'static str,
+    /// The file name's ending.
+    ending: &'static str,
+    /// What is taken from the GeoPackage.
+    source: &'static [&'static str],
+    /// Options for making such a file.
+    options: &'static [&'static str],
+    /// Open options for reading it through MESHMARK.
+    open: &'static [&'static str],
+}
+
+/// LIBKML writes no invalid polygon.
+const LINES: [&str; 2] = ["-nlt", "MULTILINESTRING"];
+const PLAIN: Read = Read { format: "", ending: "", source: &LAYER, options: &[], open: &[] };
+/// These formats do not say which CRS they are in.
+const CRS: [&str; 2] = ["-oo", "SRS=EPSG:3067"];
+
+const READ: &[Read] = &[
+    Read { format: "GPKG", ending: ".gpkg", ..PLAIN },
+    Read { format: "ESRI Shapefile", ending: "", source: &[], ..PLAIN }, // all layers, in a folder
+    Read { format: "ESRI Shapefile", ending: ".shp", ..PLAIN },
+    Read { format: "ESRI Shapefile", ending: ".shz", ..PLAIN },
+    Read { format: "ESRI Shapefile", ending: ".shp.zip", ..PLAIN },
+    Read { format: "GeoJSON", ending: ".geojson", ..PLAIN },
+    Read { format: "GeoJSON", ending: "-7946.geojson", options: &["-lco", "RFC7946=YES"], ..PLAIN },
+    Read { format: "GeoJSONSeq", ending: ".geojsonl", ..PLAIN },
+    Read { format: "FlatGeobuf", ending: ".fgb", ..PLAIN },
+    Read { format: "GML", ending: ".gml", ..PLAIN },
+    Read { format: "GML", ending: "-2.gml", options: &["-dsco", "FORMAT=GML2"], ..PLAIN },
+    Read { format: "KML", ending: ".kml", source: &BARE, ..PLAIN },
+    Read { format: "LIBKML", ending: ".kmz", source: &BARE, options: &LINES, ..PLAIN },
+    Read { format: "MapInfo File", ending: ".tab", ..PLAIN },
+    Read { format: "MapInfo File", ending: ".mif", open: &CRS, ..PLAIN },
+    Read { format: "DXF", ending: ".dxf", source: &BARE, open: &CRS, ..PLAIN },
+    Read { format: "CSV", ending: ".csv", options: &["-lco", "GEOMETRY=AS_WKT"], open: &CRS, ..PLAIN },
+    Read { format: "SQLite", ending: ".sqlite", ..PLAIN },
+    Read { format: "SQLite", ending: "-spatialite.sqlite", options: &["-dsco", "SPATIALITE=YES"], ..PLAIN },
+];
+
+#[test]
+fn a_map_in_any_format_is_marked_by_reading_and_verifies_in_the_same_format() {
+    for Read { format, ending, source, options, open } in READ {
+        let host = Host::new();
+        let (map, marked) = (format!("map{ending}"), format!("marked{ending}"));
+        let from = kotka();
+        let make = [&["-f", format, &map, &from][..], source, options].concat();
+        host.run("ogr2ogr", &make).succeeds();
+        // What the format adds of its own cannot always be written again.
+        let again = [&["-oo", "RECORD=record.json"][..], options, open].concat();
+        let run = host.mark(format, &marked, &map, &again);
+        assert_eq!(run.code, Some(0), "{marked}: {}", run.stderr);
+        assert!(run.errors().is_empty() && !run.stderr.contains("MESHMARK"), "{marked}: {}", run.stderr);
+        host.matches(&map, &["--record", "record.json", &marked]);
+    }
+}
+
+#[test]
+fn a_zipped_shapefile_is_read_where_it_is() {
+    let host = Host::new();
+    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "map.shz", &kotka(), "buildings"]).succeeds();
+    fs::rename(host.path("map.shz"), host.path("map.zip")).unwrap();
+    host.mark("GPKG", "marked.gpkg", "/vsizip/map.zip", &["-oo", "RECORD=record.json"]).succeeds();
+    host.matches("/vsizip/map.zip", &["--record", "record.json", "marked.gpkg"]);
+}
+
+/// The places of a map as texts of its attributes would undo the mark.
+#[test]
+fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
+    let host = Host::new();
+    let make = ["-f", "CSV", "map.csv", &kotka(), "buildings", "-lco", "GEOMETRY=AS_WKT"];
+    host.run("ogr2ogr", &make).succeeds();
+    host.mark("GPKG", "marked.gpkg", "map.csv", &CRS).succeeds();
+    let layer = host.run("ogrinfo", &["-so", "marked.gpkg", "map"]).succeeds().stdout;
+    assert!(layer.contains("osm_id: String") && !layer.contains("WKT: String"), "{layer}");
+
+    // A host that opens the file by itself gets them, and hands them on.
+    let run = host.create("out.gpkg", "map.csv", &["-a_srs", "EPSG:3067"]).succeeds();
+    let warnings = run.warnings();
+    let named = |w: &&str| w.contains("attribute \"WKT\"") && w.contains("KEEP_GEOM_COLUMNS=NO");
+    assert_eq!(warnings.iter().filter(|w| named(w)).count(), 1, "{}", run.stderr);
+    let more = ["-dsco", "REFERENCE=b.gpkg", "-dsco", "RECORD=b.json", "-oo", "KEEP_GEOM_COLUMNS=NO"];
+    let run =
+        host.create("b_out.gpkg", "map.csv", &[&more[..], &["-a_srs", "EPSG:3067"]].concat()).succeeds();
+    assert!(run.warnings().is_empty(), "{}", run.stderr);
+}
+
+// --- writing ---------------------------------------------------------------------------------------
+
+const IN_DEGREES: [&str; 3] = ["buildings", "-t_srs", "EPSG:4326"];
+
+#[test]
+fn these_formats_are_written_marked_and_verify() {
+    let cases: &[(&str, &[&str])] = &[
+        ("out.gpkg", &LAYER),
+        ("out.shp", &LAYER),
+        ("out.shz", &LAYER),
+        ("out.shp.zip", &LAYER),
+        ("out.fgb", &LAYER),
+        ("out.geojson", &LAYER),
+        ("out.geojson", &["buildings", "-t_srs", "EPSG:4326", "-lco", "RFC7946=YES"]),
+        ("out.geojson", &["buildings", "-t_srs", "EPSG:4326", "-lco", "COORDINATE_PRECISION=7"]),
+        ("out.geojsonl", &IN_DEGREES),
+        ("out.txt", &["buildings", "-t_srs", "EPSG:4326", "-dsco", "FORMAT=GeoJSONSeq", "-lco", "RS=YES"]),
+    ];
+    for (target, more) in cases {
+        let host = Host::new();
+        let run = host.create(target, &kotka(), more).succeeds();
+        assert!(!run.stderr.contains("MESHMARK"), "{target}: {}", run.stderr);
+        host.matches("ref.gpkg", &["--record", "record.json", target]);
+        let is_ours = |name: &String| ["key.json", "record.json", "ref.gpkg"].contains(&name.as_str());
+        let written: Vec<_> = host.names().into_iter().filter(|name| !is_ours(name)).collect();
+        assert!(written.iter().all(|name| name.starts_with("out.")), "{target}: {written:?}");
+        assert!(written.contains(&target.to_string()), "{written:?}");
+    }
+}
+
+#[test]
+fn other_formats_are_refused_with_a_way_to_them() {
+    let remedy = "write a GPKG and convert it, or mark by reading";
+    let cases: &[(&str, &[&str], [&str; 2])] = &[
+        ("out.gml", &LAYER, ["extension \"gml\"", remedy]),
+        ("out.kml", &IN_DEGREES, ["extension \"kml\"", remedy]),
+        ("out.kml", &["buildings", "-dsco", "FORMAT=LIBKML"], ["FORMAT=LIBKML", remedy]),
+        ("out.tab", &LAYER, ["extension \"tab\"", remedy]),
+        ("out.dxf", &BARE, ["extension \"dxf\"", remedy]),
+        ("out.csv", &["buildings", "-lco", "GEOMETRY=AS_WKT"], ["extension \"csv\"", remedy]),
+        ("out.sqlite", &LAYER, ["extension \"sqlite\"", remedy]),
+        ("out.zip", &LAYER, ["extension \"zip\"", remedy]),
+        ("PG:dbname=map", &LAYER, ["PG:dbname=map: a name without extension", remedy]),
+        ("PG:dbname=map", &["buildings", "-dsco", "FORMAT=PostgreSQL"], ["FORMAT=PostgreSQL", remedy]),
+        (
+            "out.geojson",
+            &["buildings", "-lco", "RFC7946=YES"],
+            ["\"buildings\" is not in WGS 84", "-t_srs EPSG:4326"],
+        ),
+        ("out.geojsonl", &LAYER, ["GeoJSONSeq would bring it", "-t_srs EPSG:4326"]),
+        ("out.geojsonl", &["-t_srs", "EPSG:4326"], ["GeoJSONSeq holds one layer", "write a GeoPackage"]),
+    ];
+    for (target, more, words) in cases {
+        let host = Host::new();
+        let run = host.create(target, &kotka(), more);
+        assert_eq!(run.code, Some(1), "{target}: {}", run.stderr);
+        for word in words {
+            assert!(run.stderr.contains(word), "{target}: {word:?} is not in: {}", run.stderr);
+        }
+        assert_eq!(host.names(), ["key.json"], "{target}");
+    }
+}
+
+/// The remedy of the refusal.
+#[test]
+fn a_marked_map_that_is_converted_carries_the_message() {
+    let host = Host::new();
+    host.create("out.gpkg", &kotka(), &BARE).succeeds();
+    let cases = [
+        ("KML", "out.kml"),
+        ("GML", "out.gml"),
+        ("MapInfo File", "out.tab"),
+        ("DXF", "out.dxf"),
+        ("SQLite", "out.sqlite"),
+    ];
+    for (format, target) in cases {
+        let run = host.run("ogr2ogr", &["-f", format, target, "out.gpkg"]);
+        assert_eq!(run.code, Some(0), "{target}: {}", run.stderr);
+        host.matches("ref.gpkg", &["--record", "record.json", target]);
+    }
+}
