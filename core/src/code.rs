@@ -75,6 +75,12 @@ impl Code {
         Self::NAMES[self as usize].to_lowercase()
     }
 
+    /// CODE when it is not given: LDPC for messages it can carry, as it reads more of them from the same
+    /// displacement (docs/evaluation.md).
+    pub fn default_for(message_bits: usize) -> Self {
+        if message_bits == K { Code::Ldpc } else { Code::Repetition }
+    }
+
     /// CHIP_RATE when it is not given: the same displacement with either code.
     pub fn default_chip_rate(self) -> usize {
         2 / self.expansion()

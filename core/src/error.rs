@@ -142,21 +142,26 @@ fn too_few(vertices: usize, patch_size: usize, spelling: Spelling) -> String {
 }
 
 fn too_many(code: Code, bits: usize, chip_rate: usize, vertices: usize, spelling: Spelling) -> String {
-    let (coded, shorter) = match code {
-        Code::Ldpc => (spelling.value("CODE", "LDPC") + " and ", spelling.value("CODE", "REPETITION")),
-        Code::Repetition => (String::new(), "a shorter message".into()),
+    let (room, repetition) = (vertices - 1, spelling.value("CODE", "REPETITION"));
+    let fits = |code: Code| match room / (code.expansion() * bits) {
+        0 => None,
+        1 => Some(spelling.value("CHIP_RATE", 1)),
+        most => Some(spelling.value("CHIP_RATE", most) + " or less"),
     };
-    let channel_bits = code.expansion() * bits;
-    let fewer = match (vertices - 1) / channel_bits {
-        0 => String::new(),
-        most => spelling.value("CHIP_RATE", most) + " or less, ",
+    let (with, uncoded) = match code {
+        Code::Ldpc => (
+            spelling.value("CODE", "LDPC") + " and ",
+            fits(Code::Repetition).map(|c| format!("{repetition} and {c}")),
+        ),
+        Code::Repetition => (String::new(), None),
     };
+    let remedies = [fits(code), uncoded.or_else(|| Some("a shorter message".into()))];
+    let remedies: String = remedies.into_iter().flatten().map(|remedy| remedy + ", ").collect();
     format!(
-        "a message of {bits} bits with {coded}{} needs {} coefficients, but the smallest patch ({vertices} vertices) \
-         has {}: use {fewer}{shorter} or a larger {}",
+        "a message of {bits} bits with {with}{} needs {} coefficients, but the smallest patch ({vertices} vertices) has \
+         {room}: use {remedies}or a larger {}",
         spelling.value("CHIP_RATE", chip_rate),
-        channel_bits * chip_rate,
-        vertices - 1,
+        code.expansion() * bits * chip_rate,
         spelling.name("PATCH_SIZE")
     )
 }

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use sha2::Sha256;
 use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
 
+/// How long the message of a recipient is.
+pub const RECIPIENT_BITS: usize = 128;
+
 const VERSION: u32 = 1;
 
 /// A 256-bit secret. It never prints itself and is wiped from memory when dropped.
@@ -70,9 +73,9 @@ impl SecretKey {
         to_hex(&self.derive("key id", b"")[..8])
     }
 
-    /// The message of a recipient: 128 bits of a keyed hash of the text.
+    /// The message of a recipient: [`RECIPIENT_BITS`] of a keyed hash of the text.
     pub fn recipient_message(&self, recipient: &str) -> Message {
-        Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..16])
+        Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..RECIPIENT_BITS / 8])
     }
 
     /// The seed of the chip streams.
@@ -128,7 +131,7 @@ mod tests {
     #[test]
     fn recipients_and_keys_have_messages_of_their_own() {
         let (a, b) = (SecretKey::from_bytes([1; 32]), SecretKey::from_bytes([2; 32]));
-        assert_eq!(a.recipient_message("ACME").len(), 128);
+        assert_eq!(a.recipient_message("ACME").len(), RECIPIENT_BITS);
         assert_ne!(a.recipient_message("ACME"), a.recipient_message("ACME "));
         assert_ne!(a.recipient_message("ACME"), b.recipient_message("ACME"));
         assert_ne!(a.id(), b.id());

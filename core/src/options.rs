@@ -1,7 +1,12 @@
 //! The watermark options: one table that makes the driver's option list, the parser, the flags of
 //! the command line and the table in the docs.
 
-use crate::{Error, Result, code::Code, key::SecretKey, message::Message};
+use crate::{
+    Error, Result,
+    code::Code,
+    key::{RECIPIENT_BITS, SecretKey},
+    message::Message,
+};
 use serde::{Deserialize, Serialize};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
@@ -119,16 +124,17 @@ pub const OPTIONS: &[OptionSpec] = &[
     row(
         "CODE",
         Kind::Choice(&Code::NAMES),
-        Some("REPETITION"),
+        None,
         true,
-        "REPETITION carries the message bits as they are; LDPC turns 128 of them into 256 that correct errors",
+        "LDPC turns 128 message bits into 256 that correct errors, REPETITION carries any number as they are; by \
+         default LDPC for 128 bits, otherwise REPETITION",
     ),
     row(
         "CHIP_RATE",
         Kind::Integer(1, 2048),
         None,
         true,
-        "Coefficients that carry each of those bits, per patch and axis; by default 2, with LDPC 1",
+        "Coefficients that carry each of those bits, per patch and axis; by default 1 with LDPC, 2 with REPETITION",
     ),
     row(
         "PATCH_SIZE",
@@ -228,8 +234,9 @@ pub struct Parameters {
 }
 
 impl Default for Parameters {
+    /// Those of a message as long as a recipient's.
     fn default() -> Self {
-        Options::parse([("MESSAGE", "00")]).expect("the defaults are legal").parameters
+        Options::parse([]).expect("the defaults are legal").parameters
     }
 }
 
@@ -318,7 +325,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Parses name-value pairs; names in any case.
+    /// Parses name-value pairs; names in any case. Where the message is not given, it is taken to be as long
+    /// as a recipient's.
     ///
     /// # Errors
     /// An unknown name, a name given twice, a value that is not what its row says, both RECIPIENT and
@@ -327,10 +335,12 @@ impl Options {
         let values = Values::collect(OPTIONS, pairs)?;
         let precision = values.number("PRECISION")?;
         let subject = values.subject()?;
-        let code = values.choice("CODE", Code::from_name)?;
-        if let Some(Subject::Message(message)) = &subject {
-            code.channel_bits(message.len())?;
-        }
+        let bits = match &subject {
+            Some(Subject::Message(message)) => message.len(),
+            Some(Subject::Recipient(_)) | None => RECIPIENT_BITS,
+        };
+        let code = values.choice("CODE", Code::from_name)?.unwrap_or(Code::default_for(bits));
+        code.channel_bits(bits)?;
         Ok(Options {
             key_path: values.text("KEY")?,
             subject,
@@ -340,8 +350,8 @@ impl Options {
                 chip_rate: values.integer("CHIP_RATE")?.unwrap_or(code.default_chip_rate()),
                 patch_size: values.integer("PATCH_SIZE")?.expect("has a default"),
                 tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
-                shape: values.choice("SHAPE", Shape::from_name)?,
-                laplacian: values.choice("BASIS", Laplacian::from_name)?,
+                shape: values.choice("SHAPE", Shape::from_name)?.expect("has a default"),
+                laplacian: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
                 precision,
             },
             layers: values.list("LAYERS")?,
@@ -415,8 +425,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    fn choice<T>(&self, name: &str, from_name: impl Fn(&str) -> Option<T>) -> Result<T> {
-        Ok(self.parsed(name, |_, text| from_name(text))?.expect("has a default"))
+    fn choice<T>(&self, name: &str, from_name: impl Fn(&str) -> Option<T>) -> Result<Option<T>> {
+        self.parsed(name, |_, text| from_name(text))
     }
 
     /// The value given, or the default, as `parse` understands it.
@@ -516,13 +526,32 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_table() {
         let p = Parameters::default();
-        assert_eq!((p.amplitude_m, p.chip_rate, p.patch_size), (0.10, 2, 480));
-        assert_eq!((p.tolerance_m, p.precision, p.code), (0.75, None, Code::Repetition));
+        assert_eq!((p.amplitude_m, p.patch_size), (0.10, 480));
+        assert_eq!((p.tolerance_m, p.precision), (0.75, None));
         assert_eq!((p.shape, p.laplacian), (Shape::Free, Laplacian::Biggs));
-        let chip_rate = |pairs: &[_]| Options::parse(pairs.iter().copied()).unwrap().parameters.chip_rate;
-        assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 2, with LDPC 1"));
-        assert_eq!((chip_rate(&[]), chip_rate(&[("CODE", "LDPC")])), (2, 1));
-        assert_eq!(chip_rate(&[("CODE", "ldpc"), ("CHIP_RATE", "3")]), 3);
+    }
+
+    #[test]
+    fn code_and_chip_rate_follow_the_length_of_the_message_unless_they_are_given() {
+        let parsed = |pairs: &[_]| {
+            let p = Options::parse(pairs.iter().copied()).unwrap().parameters;
+            (p.code, p.chip_rate)
+        };
+        assert!(spec("CODE").unwrap().help.ends_with("by default LDPC for 128 bits, otherwise REPETITION"));
+        assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 1 with LDPC, 2 with REPETITION"));
+        let of_128_bits = ("MESSAGE", "00112233445566778899aabbccddeeff");
+        for subject in [&[][..], &[("RECIPIENT", "ACME")], &[of_128_bits]] {
+            assert_eq!(parsed(subject), (Code::Ldpc, 1));
+            let and = |more: &[_]| parsed(&[subject, more].concat());
+            assert_eq!(and(&[("CODE", "repetition")]), (Code::Repetition, 2));
+            assert_eq!(and(&[("CHIP_RATE", "3")]), (Code::Ldpc, 3));
+            assert_eq!(and(&[("CODE", "REPETITION"), ("CHIP_RATE", "1")]), (Code::Repetition, 1));
+        }
+        for hex in ["00", "0123456789abcdef", &"0".repeat(31), &"0".repeat(33), &"0".repeat(64)] {
+            assert_eq!(parsed(&[("MESSAGE", hex)]), (Code::Repetition, 2), "{hex}");
+            assert_eq!(parsed(&[("MESSAGE", hex), ("CHIP_RATE", "3")]), (Code::Repetition, 3));
+        }
+        assert_eq!(Parameters::default(), Options::parse([("RECIPIENT", "ACME")]).unwrap().parameters);
     }
 
     #[test]

@@ -373,7 +373,7 @@ fn bridge(patch: &mut Patch, points: &[[f64; 2]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ground::Ground, vertices::VertexTable};
+    use crate::{code::Code, ground::Ground, vertices::VertexTable};
 
     const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 
@@ -409,7 +409,7 @@ mod tests {
     #[test]
     fn capacity_counts_the_mean_as_taken() {
         let cut = Patches::new(&Map::of_points(&scattered(600), METRES), &size(300)).unwrap();
-        let p = Parameters { chip_rate: 1, ..Parameters::default() };
+        let p = Parameters { code: Code::Repetition, chip_rate: 1, ..Parameters::default() };
         assert_eq!(cut.carriers(299, &p), Ok(299));
         assert!(cut.carriers(300, &p).unwrap_err().to_string().contains("has 299"));
     }

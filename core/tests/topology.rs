@@ -1,6 +1,7 @@
 //! Marking keeps the topology of a map: proved on maps of random houses, walls and roads.
 
 use meshmark_core::{
+    code::Code,
     embedding::{Marked, embed},
     ground::Ground,
     key::SecretKey,
@@ -132,7 +133,7 @@ fn laplacians() -> impl Strategy<Value = Laplacian> {
 }
 
 fn parameters() -> Parameters {
-    Parameters { patch_size: 150, ..Parameters::default() }
+    Parameters { code: Code::Repetition, chip_rate: 2, patch_size: 150, ..Parameters::default() }
 }
 
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {

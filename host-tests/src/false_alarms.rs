@@ -62,7 +62,7 @@ pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<V
     std::fs::write(&key, right.to_json().as_bytes())?;
     let original = noise::snap(&Map::read(map)?, PRECISION_M);
     original.write(&reference)?;
-    let (recipient, profile) = ("the recipient", Profile::repetition(2));
+    let (recipient, profile) = ("the recipient", Profile::LDPC); // what `examine` takes, by default
     let marking = Marking { key: &key, recipient, profile, precision: PRECISION_M };
     product.mark(&reference, &marked, &path("record.json"), marking)?;
     let marked = Map::read(&marked)?;

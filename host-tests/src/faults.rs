@@ -58,6 +58,8 @@ impl Scene {
             "-dsco",
             "MESSAGE=0123456789abcdef0123456789abcdef",
             "-dsco",
+            "CODE=REPETITION",
+            "-dsco",
             "CHIP_RATE=1",
         ]
         .map(String::from)

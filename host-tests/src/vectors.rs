@@ -3,6 +3,7 @@
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::{
     carrier::{Carrier, bit_of_coefficient},
+    code::Code,
     demodulation,
     embedding::{Marked, embed},
     ground::Ground,
@@ -86,7 +87,7 @@ pub struct Marking {
     pub reference: VertexTable,
     /// Metres on the ground.
     pub ground: Ground,
-    /// The default parameters.
+    /// The default parameters with the paper's code.
     pub parameters: Parameters,
     /// The message of the recipient.
     pub message: Message,
@@ -104,7 +105,8 @@ impl Marking {
         let map = read(&reference_path());
         let on_ground = map.map().expect("a projected CRS");
         let ground = on_ground.ground;
-        let parameters = Parameters::default();
+        let code = Code::Repetition;
+        let parameters = Parameters { code, chip_rate: code.default_chip_rate(), ..Parameters::default() };
         let message = key().recipient_message(RECIPIENT);
         let marked = embed(&on_ground, &key(), &message, &parameters).expect("it fits");
         let patches = Patches::new(&on_ground, &parameters).expect("it fits");

@@ -84,8 +84,11 @@ fn a_code_that_does_not_fit_the_message_says_what_does() {
     let options = [&KEY[..], &["-oo", "CODE=LDPC", "-oo", "MESSAGE=0123456789abcdef"]].concat();
     refuses(&Host::new(), &map(), &options, &["exactly 128 bits, not 64", "32 hexadecimal digits"]);
     refuses_map(&Host::new(), &map(), &["-oo", "CODE=MORSE"], &["CODE=MORSE", "REPETITION or LDPC"]);
-    let words = ["CODE=LDPC and CHIP_RATE=3 needs 768", "CHIP_RATE=2 or less, CODE=REPETITION or a larger"];
-    refuses_map(&Host::new(), &map(), &["-oo", "CODE=LDPC", "-oo", "CHIP_RATE=3"], &words);
+    let words = [
+        "CODE=LDPC and CHIP_RATE=3 needs 768",
+        "CHIP_RATE=2 or less, CODE=REPETITION and CHIP_RATE=4 or less, or",
+    ];
+    refuses_map(&Host::new(), &map(), &["-oo", "CHIP_RATE=3"], &words);
 }
 
 #[test]
@@ -125,8 +128,21 @@ fn a_map_that_is_too_small_is_told_which_patch_size_fits() {
 
 #[test]
 fn a_message_that_is_too_long_for_the_patches_is_told_what_fits() {
-    let words = ["128 bits with CHIP_RATE=8", "CHIP_RATE=4 or less"];
-    refuses_map(&Host::new(), &map(), &["-oo", "CHIP_RATE=8"], &words);
+    let host = Host::new();
+    let words =
+        ["128 bits with CHIP_RATE=8", "use CHIP_RATE=4 or less, a shorter message, or a larger PATCH_SIZE"];
+    refuses_map(&host, &map(), &["-oo", "CODE=REPETITION", "-oo", "CHIP_RATE=8"], &words);
+    // What is advised for small patches is taken.
+    let words = [
+        "CODE=LDPC and CHIP_RATE=1 needs 256",
+        "use CODE=REPETITION and CHIP_RATE=1, or a larger PATCH_SIZE",
+    ];
+    refuses_map(&host, &map(), &["-oo", "PATCH_SIZE=200"], &words);
+    host.copy("kotka.gpkg", "map.gpkg");
+    let advised = ["-oo", "PATCH_SIZE=200", "-oo", "CODE=REPETITION", "-oo", "CHIP_RATE=1"];
+    host.mark("GPKG", "marked.gpkg", "map.gpkg", &advised).succeeds();
+    let words = ["CODE=LDPC and CHIP_RATE=1 needs 256", "use a shorter message, or a larger PATCH_SIZE"];
+    refuses_map(&Host::new(), &map(), &["-oo", "PATCH_SIZE=100"], &words);
 }
 
 /// A GeoJSON map of points, in metres.

@@ -2,7 +2,8 @@
 
 use gdal::Dataset;
 use meshmark_core::{
-    carrier::Carrier, demodulation, ground::Ground, patches::Patches, record::Record, vertices::VertexTable,
+    carrier::Carrier, code::Code, demodulation, ground::Ground, patches::Patches, record::Record,
+    vertices::VertexTable,
 };
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
 use meshmark_host_tests::{
@@ -106,7 +107,8 @@ fn the_record_says_what_was_done_and_keeps_the_secret() {
     assert_eq!(record.reference.vertices, table.len());
     assert_eq!(record.reference.vertices_sha256, table.digest());
     assert_eq!(record.reference.crs.as_deref(), Some("EPSG:3067"));
-    assert_eq!((record.amplitude_m, record.chip_rate, record.patch_size), (0.2, 2, 480));
+    assert_eq!((record.amplitude_m, record.patch_size), (0.2, 480));
+    assert_eq!((record.code, record.chip_rate), (Code::Ldpc, 1));
     assert_eq!(record.recipient.as_deref(), Some("ACME GmbH"));
     assert_eq!(record.message, host.key().recipient_message("ACME GmbH").to_hex());
     assert_eq!(record.key_id, host.key().id());
@@ -138,6 +140,7 @@ fn a_message_instead_of_a_recipient_is_recorded_as_it_is() {
     host.run("ogr2ogr", &arguments).succeeds();
     let record = Record::from_json(&fs::read_to_string(host.path("record.json")).unwrap()).unwrap();
     assert_eq!((record.message.as_str(), record.recipient), ("c0ffee11", None));
+    assert_eq!((record.code, record.chip_rate), (Code::Repetition, 2));
 }
 
 #[test]

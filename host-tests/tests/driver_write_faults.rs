@@ -231,6 +231,7 @@ impl InProcess {
             format!("KEY={}", path("key.json")),
             format!("REFERENCE={}", path(&format!("ref_{target}"))),
             "PATCH_SIZE=130".into(),
+            "CODE=REPETITION".into(),
             "CHIP_RATE=1".into(),
             "MESSAGE=0123456789abcdef0123456789abcdef".into(),
         ];
@@ -268,9 +269,9 @@ impl InProcess {
     fn wrote(&self, target: &str) {
         assert_eq!(last_failure(), None);
         let reference = format!("ref_{target}");
-        let how =
-            ["--message", "0123456789abcdef0123456789abcdef", "--chip-rate", "1", "--patch-size", "130"];
-        let (run, report) = self.host.verify(&reference, &[&how[..], &[target]].concat());
+        let message = ["--message", "0123456789abcdef0123456789abcdef"];
+        let how = ["--code", "repetition", "--chip-rate", "1", "--patch-size", "130", target];
+        let (run, report) = self.host.verify(&reference, &[&message[..], &how].concat());
         assert_eq!((run.code, &report["bit_errors"]), (Some(0), &0.into()), "{}", run.stderr);
     }
 }

@@ -20,8 +20,9 @@ fn marked(fixture: &str, options: &[&str]) -> Host {
 
 #[test]
 fn the_message_is_read_without_a_record() {
-    let host = marked("helsinki.gpkg", &["-oo", "CHIP_RATE=3", "-oo", "AMPLITUDE=0.15"]);
-    let how = ["--chip-rate", "3", "--amplitude", "0.15"];
+    let host =
+        marked("helsinki.gpkg", &["-oo", "PATCH_SIZE=600", "-oo", "CHIP_RATE=2", "-oo", "AMPLITUDE=0.08"]);
+    let how = ["--patch-size", "600", "--chip-rate", "2", "--amplitude", "0.08"];
     host.matches("map.gpkg", &[&how[..], &["--recipient", "ACME GmbH", "marked.gpkg"]].concat());
     let message = host.key().recipient_message("ACME GmbH").to_hex();
     let report = host.matches("map.gpkg", &[&how[..], &["--message", &message, "marked.gpkg"]].concat());
@@ -34,23 +35,76 @@ fn the_message_is_read_without_a_record() {
     assert!(report["bit_errors"].is_null() && report["p_value_log10"].is_null());
 }
 
+/// The code and the chip rate of a report or a record.
+fn code_of(document: &Value) -> (&str, u64) {
+    (document["code"].as_str().unwrap(), document["chip_rate"].as_u64().unwrap())
+}
+
+fn record(host: &Host) -> Value {
+    serde_json::from_slice(&std::fs::read(host.path("acme.json")).unwrap()).unwrap()
+}
+
 #[test]
-fn a_coded_message_is_read_with_a_record_and_without() {
-    let host = marked("kotka.gpkg", &["-oo", "CODE=LDPC"]);
-    let how = ["--code", "ldpc", "--recipient", "ACME GmbH", "marked.gpkg"];
-    for more in [&["--record", "acme.json", "marked.gpkg"][..], &how[..]] {
-        let report = host.matches("map.gpkg", more);
-        assert_eq!(
-            (&report["parameters"]["code"], &report["parameters"]["chip_rate"]),
-            (&"ldpc".into(), &1.into())
-        );
+fn a_recipient_is_coded_by_default_and_read_with_a_record_and_without() {
+    let host = marked("kotka.gpkg", &[]);
+    assert_eq!(code_of(&record(&host)), ("ldpc", 1));
+    let message = host.key().recipient_message("ACME GmbH").to_hex();
+    for how in [["--record", "acme.json"], ["--recipient", "ACME GmbH"], ["--message", &message]] {
+        let report = host.matches("map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
+        assert_eq!(code_of(&report["parameters"]), ("ldpc", 1));
         assert_eq!(report["code"]["parity_holds"], true);
         assert_eq!(report["code"]["decoder"], "belief-propagation");
         assert_eq!(report["bits"].as_array().unwrap().len(), 128);
     }
     // Under another code there is no such mark.
-    let (run, report) = host.verify("map.gpkg", &["--recipient", "ACME GmbH", "marked.gpkg"]);
+    let repeated = ["--code", "repetition", "--recipient", "ACME GmbH", "marked.gpkg"];
+    let (run, report) = host.verify("map.gpkg", &repeated);
     assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
+}
+
+#[test]
+fn a_message_of_another_length_is_repeated_by_default() {
+    let host = Host::new();
+    host.copy("kotka.gpkg", "map.gpkg");
+    let options =
+        ["KEY=key.json", "RECORD=acme.json", "MESSAGE=0123456789abcdef"].map(|option| ["-oo", option]);
+    let arguments =
+        [&["-f", "GPKG", "marked.gpkg", "MESHMARK:map.gpkg"][..], options.as_flattened()].concat();
+    host.run("ogr2ogr", &arguments).succeeds();
+    assert_eq!(code_of(&record(&host)), ("repetition", 2));
+    for how in [["--record", "acme.json"], ["--message", "0123456789abcdef"]] {
+        let report = host.matches("map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
+        assert_eq!(code_of(&report["parameters"]), ("repetition", 2));
+    }
+}
+
+#[test]
+fn a_code_that_is_given_is_the_one_of_the_mark() {
+    let host = marked("helsinki.gpkg", &["-oo", "CODE=REPETITION"]);
+    assert_eq!(code_of(&record(&host)), ("repetition", 2));
+    let how = ["--code", "repetition", "--recipient", "ACME GmbH"];
+    for how in [&["--record", "acme.json"][..], &how] {
+        let report = host.matches("map.gpkg", &[how, &["marked.gpkg"]].concat());
+        assert_eq!(code_of(&report["parameters"]), ("repetition", 2));
+    }
+}
+
+#[test]
+fn a_person_reads_how_the_message_was_decoded() {
+    let host = marked("kotka.gpkg", &[]);
+    let command = library().with_file_name("meshmark");
+    let arguments =
+        ["verify", "--explain", "--key", "key.json", "--reference", "map.gpkg", "--record", "acme.json"];
+    let text_of =
+        |suspect| host.run(command.to_str().unwrap(), &[&arguments[..], &[suspect]].concat()).stdout;
+    let text = text_of("marked.gpkg");
+    let decoded = "0 of 256 code bits were wrong; read by belief propagation, all parity checks hold";
+    assert!(text.contains("(0 of 128 bits differ from the expected message)\ncode:         "), "{text}");
+    assert!(text.contains(&format!("code:         {decoded}\n")), "{text}");
+    assert!(text.contains(&format!("How it was decoded: {decoded}.\n")), "{text}");
+    // Where there is no mark, there was nothing to decode.
+    let text = text_of("map.gpkg");
+    assert!(text.contains("NO MATCH") && !text.contains("code bits"), "{text}");
 }
 
 #[test]

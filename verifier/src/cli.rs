@@ -2,7 +2,7 @@
 
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand};
 use meshmark_core::{
-    key::SecretKey,
+    key::{RECIPIENT_BITS, SecretKey},
     message::Message,
     options::{OPTIONS, Options, Spelling, Subject},
     record::Record,
@@ -233,7 +233,7 @@ fn request(args: VerifyArgs) -> Result<Request> {
     };
     let expected = options.subject.as_ref().map(|subject| subject.message(&key));
     Ok(Request {
-        bits: expected.as_ref().map_or(128, Message::len),
+        bits: expected.as_ref().map_or(RECIPIENT_BITS, Message::len),
         recipient: options.subject.and_then(|subject| match subject {
             Subject::Recipient(text) => Some(text),
             Subject::Message(_) => None,

@@ -128,6 +128,7 @@ fn found(report: &Report) -> Vec<String> {
         format!(", which differs from the expected message in {errors} of {} bits", report.bits.len())
     });
     sentences.push(format!("The suspect was read as the message {message}{errors}."));
+    sentences.extend(report.decoding().map(|how| format!("How it was decoded: {how}.")));
     sentences.extend(probabilities(report));
     sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
     sentences

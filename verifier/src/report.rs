@@ -165,9 +165,9 @@ impl Report {
                 format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
             });
             lines.push(format!("message:      {message}{errors}"));
-            lines.extend(self.code.to_text());
-            // Of noise, too, bits are made; their odds suppose a mark.
-            lines.push(match self.verdict == Verdict::Match || self.shows_key() {
+            // Of noise, too, a code word and bits are made; their odds suppose a mark.
+            lines.extend(self.decoding().map(|how| format!("code:         {how}")));
+            lines.push(match self.shows_mark() {
                 true => format!("bits:         {}", certainty(&self.bits)),
                 false => "bits:         no better than guessed, for no mark of this key shows".into(),
             });
@@ -208,6 +208,24 @@ impl Report {
         lines
     }
 
+    /// What LDPC did with the mark that shows, for a person.
+    pub(crate) fn decoding(&self) -> Option<String> {
+        let how = match self.code.decoder.filter(|_| self.shows_mark())? {
+            Decoder::Sign => return None,
+            Decoder::BeliefPropagation => "belief propagation, all parity checks hold",
+            Decoder::OrderedStatistics => "ordered statistics, the most likely code word of those near",
+        };
+        let of = self.code.name.channel_bits(self.bits.len()).expect("they were decoded");
+        let wrong =
+            self.code.channel_bit_errors.map(|wrong| format!("{wrong} of {of} code bits were wrong; "));
+        Some(format!("{}read by {how}", wrong.unwrap_or_default()))
+    }
+
+    /// Whether what was decoded is a mark rather than noise.
+    fn shows_mark(&self) -> bool {
+        self.verdict == Verdict::Match || self.shows_key()
+    }
+
     /// Whether some mark of the key is there, whatever its message.
     pub(crate) fn shows_key(&self) -> bool {
         self.p_any_message_log10.is_some_and(|p| p < self.parameters.significance.log10())
@@ -228,19 +246,6 @@ impl Report {
             Verdict::NoMatch => ExitCode::NoMatch,
             Verdict::Inconclusive => ExitCode::Inconclusive,
         }
-    }
-}
-
-impl CodeEntry {
-    /// What LDPC did, for a person.
-    fn to_text(self) -> Option<String> {
-        let how = match self.decoder? {
-            Decoder::Sign => return None,
-            Decoder::BeliefPropagation => "belief propagation, all parity checks hold",
-            Decoder::OrderedStatistics => "ordered statistics, the most likely code word of those near",
-        };
-        let errors = self.channel_bit_errors.map_or(String::new(), |e| format!("{e} code bits were wrong; "));
-        Some(format!("code:         {errors}read by {how}"))
     }
 }
 

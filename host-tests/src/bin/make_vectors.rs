@@ -29,7 +29,7 @@ fn mark(folder: &Path) -> io::Result<()> {
         .env("GDAL_DRIVER_PATH", plugins)
         .env("OGR_CURRENT_DATE", "2026-01-01T00:00:00.000Z")
         .args(["-f", "GPKG", "marked.gpkg", "MESHMARK:../kotka.gpkg"])
-        .args(["-oo", "KEY=key.json", "-oo", "RECORD=record.json"])
+        .args(["-oo", "KEY=key.json", "-oo", "RECORD=record.json", "-oo", "CODE=REPETITION"])
         .args(["-oo", &format!("RECIPIENT={RECIPIENT}")])
         .status()?;
     if status.success() { Ok(()) } else { Err(io::Error::other(format!("ogr2ogr: {status}"))) }
