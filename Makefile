@@ -52,9 +52,11 @@ faults: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped; installs PostgreSQL.
+# A PostGIS of its own, started and stopped, Python and QGIS; installs them.
 hosts: build
 	host-tests/hosts/postgis.sh
+	host-tests/hosts/python.sh
+	host-tests/hosts/qgis.sh
 
 fixtures:
 	fixtures/make_fixtures.sh

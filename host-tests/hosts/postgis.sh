@@ -1,32 +1,7 @@
 #!/usr/bin/env bash
 # Marks a table of a real PostGIS by reading, and checks that none is written to. Installs PostgreSQL and PostGIS
 # where they are missing; the server is a new one, in a temporary folder, reached by its socket alone.
-set -euo pipefail
-
-root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
-build=${CARGO_TARGET_DIR:-$root/target}/release
-meshmark=$build/meshmark
-fixture=$root/fixtures/kotka.gpkg
-
-fail() {
-    echo "postgis: $*" >&2
-    exit 1
-}
-
-install_missing() {
-    local missing=() package
-    for package in gdal-bin postgresql; do
-        dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
-    done
-    # PostGIS itself is named after the version of PostgreSQL.
-    [ -n "$(find /usr/share/postgresql -name postgis.control 2>/dev/null)" ] || missing+=(postgresql-postgis)
-    [ ${#missing[@]} -eq 0 ] && return
-    local as_root=()
-    [ "$(id -u)" -eq 0 ] || as_root=(sudo)
-    echo "installing ${missing[*]}"
-    "${as_root[@]}" apt-get update -q
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
-}
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 # PostgreSQL does not run as root.
 as_owner() {
@@ -60,51 +35,41 @@ stop_server() {
     exit $status
 }
 
-# verify REFERENCE SUSPECT
-verify() {
-    "$meshmark" verify --key key.json --reference "$1" --record acme.json "$2" >verify.log ||
-        fail "$2 does not verify: $(cat verify.log)"
-    grep -q '0 of 128 bits differ' verify.log || fail "bits of $2 are wrong: $(cat verify.log)"
-    echo "passed: $2 against $1"
-}
-
 tables() {
     "$programs/psql" -q -A -t -h "$server" -U meshmark map -c \
         "SELECT count(*) FROM information_schema.tables WHERE table_schema = 'public'"
 }
 
-work=$(mktemp -d)
+packages=(gdal-bin postgresql)
+# PostGIS itself is named after the version of PostgreSQL.
+[ -n "$(find /usr/share/postgresql -name postgis.control 2>/dev/null)" ] || packages+=(postgresql-postgis)
+install_missing "${packages[@]}"
 trap stop_server EXIT
-[ -f "$build/gdalplugins/ogr_MESHMARK.so" ] || fail "the driver is missing: make build"
-export GDAL_DRIVER_PATH=$build/gdalplugins
-cd "$work"
-install_missing
 start_server
-"$meshmark" keygen key.json >keygen.log
 ogr2ogr -f PostgreSQL "PG:$connection" "$fixture"
 before=$(tables)
 
 key=(-oo KEY=key.json -oo RECIPIENT="ACME GmbH")
 ogr2ogr -f GPKG marked.gpkg "MESHMARK:PG:$connection" "${key[@]}" -oo RECORD=acme.json
 ogr2ogr -f GPKG reference.gpkg "PG:$connection"
-verify reference.gpkg marked.gpkg
-verify "PG:$connection" marked.gpkg
+verify "a copy in a file" reference.gpkg marked.gpkg --record acme.json
+verify "the database as the reference" "PG:$connection" marked.gpkg --record acme.json
 
 # One table, and into the database: a copy is written by PostgreSQL's own driver.
 rm acme.json
 ogr2ogr -f PostgreSQL "PG:$connection" "MESHMARK:PG:$connection tables=buildings" "${key[@]}" -oo RECORD=acme.json \
     -nln marked
 ogr2ogr -f GPKG from_database.gpkg "PG:$connection tables=marked" # a suspect is a file
-verify "PG:$connection tables=buildings" from_database.gpkg
+verify "a copy in the database" "PG:$connection tables=buildings" from_database.gpkg --record acme.json
 [ "$(tables)" -eq $((before + 1)) ] || fail "one table is made, not $(tables) - $before"
 
 # No table is a target of marking as the last step.
 before=$(tables)
 if ogr2ogr -f MESHMARK "MESHMARK:PG:$connection" "$fixture" buildings -dsco KEY=key.json -dsco RECIPIENT=B \
-    -dsco REFERENCE=second.gpkg -dsco FORMAT=PostgreSQL 2>refused.log; then
+    -dsco REFERENCE=second.gpkg -dsco FORMAT=PostgreSQL 2>"$work/log"; then
     fail "writing to a database is not refused"
 fi
-grep -q 'FORMAT=PostgreSQL is not a format that a marked map is written to' refused.log ||
-    fail "the refusal does not say why: $(cat refused.log)"
+grep -q 'FORMAT=PostgreSQL is not a format that a marked map is written to' "$work/log" ||
+    fail "the refusal does not say why: $(cat "$work/log")"
 [ "$(tables)" -eq "$before" ] && [ ! -e second.gpkg ] || fail "a refused target was written to"
-echo "passed: PostgreSQL is refused as a target"
+passed "PostgreSQL is refused as a target"

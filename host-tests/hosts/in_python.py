@@ -1,0 +1,86 @@
+"""Writes through MESHMARK with GDAL's Python: what succeeds is verified by python.sh, what fails must leave nothing."""
+
+import os
+
+import folder
+from osgeo import gdal, ogr, osr
+
+gdal.UseExceptions()
+ogr.UseExceptions()
+osr.UseExceptions()
+
+
+def creation_options(name, key="key.json"):
+    return [f"KEY={key}", "RECIPIENT=ACME GmbH", f"REFERENCE={name}.reference.gpkg", f"RECORD={name}.json"]
+
+
+def write_all_layers():
+    written = gdal.VectorTranslate(
+        "MESHMARK:written.gpkg",
+        "map.gpkg",
+        format="MESHMARK",
+        dstSRS="EPSG:3857",
+        reproject=True,
+        datasetCreationOptions=creation_options("written"),
+    )
+    assert not os.path.exists("written.gpkg"), "the target is there before it is closed"
+    del written
+
+
+def read_with_wrong_key():
+    try:
+        gdal.OpenEx("MESHMARK:map.gpkg", open_options=["KEY=wrong.json", "RECIPIENT=B"])
+    except RuntimeError as error:
+        assert "wrong.json is not usable" in str(error), error
+    else:
+        raise AssertionError("a wrong key file is accepted")
+
+
+def write_with_wrong_key():
+    options = creation_options("wrong", key="wrong.json")
+    try:
+        gdal.VectorTranslate("MESHMARK:wrong.gpkg", "map.gpkg", format="MESHMARK", datasetCreationOptions=options)
+    except RuntimeError as error:
+        assert "wrong.json is not usable" in str(error) or "failed to create" in str(error), error
+    else:
+        raise AssertionError("a wrong key file is accepted")
+
+
+def create(name):
+    options = creation_options(name)
+    return gdal.GetDriverByName("MESHMARK").Create(f"MESHMARK:{name}.gpkg", 0, 0, 0, gdal.GDT_Unknown, options=options)
+
+
+def close_a_map_that_cannot_be_marked():
+    dataset = create("small")
+    crs = osr.SpatialReference()
+    crs.ImportFromEPSG(3067)
+    layer = dataset.CreateLayer("buildings", crs, ogr.wkbPolygon)
+    feature = ogr.Feature(layer.GetLayerDefn())
+    feature.SetGeometry(ogr.CreateGeometryFromWkt("POLYGON ((0 0,1 0,1 1,0 1,0 0))"))
+    layer.CreateFeature(feature)
+    del layer, dataset  # raises nothing, as docs/driver.md says: Python prints that an exception is ignored
+    assert "the whole map is" in gdal.GetLastErrorMsg(), gdal.GetLastErrorMsg()
+
+
+def fail_between_two_features():
+    source = gdal.OpenEx("map.gpkg")
+    dataset = create("half")
+    try:
+        dataset.StartTransaction()
+        dataset.CopyLayer(source.GetLayer("roads"), "roads")
+        raise KeyError("a mistake of the program")
+    except KeyError:
+        del dataset
+    assert "transaction" in gdal.GetLastErrorMsg(), gdal.GetLastErrorMsg()
+
+
+write_all_layers()
+with folder.unchanged("python: a wrong key file, reading"):
+    read_with_wrong_key()
+with folder.unchanged("python: a wrong key file, writing"):
+    write_with_wrong_key()
+with folder.unchanged("python: closing fails"):
+    close_a_map_that_cannot_be_marked()
+with folder.unchanged("python: the program fails between two features, in a transaction"):
+    fail_between_two_features()
