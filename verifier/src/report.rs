@@ -200,7 +200,7 @@ impl Report {
         }
         if let Some(p) = self.p_any_message_log10.filter(|_| self.verdict != Verdict::Match) {
             let says = match self.shows_key() {
-                true => "a mark of this key is present, whatever its message",
+                true => "a mark of this key is present, whatever its message or code",
                 false => "no mark of this key shows, whatever its message",
             };
             lines.push(format!("key:          {says} (p-value {})", power_of_ten(p)));
