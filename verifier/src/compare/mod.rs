@@ -90,7 +90,7 @@ pub struct Overlaps {
     pub before: usize,
     /// In the marked map.
     pub after: usize,
-    /// Those that did not overlap before.
+    /// Those that did not before, and have got more than a sliver in common.
     pub new: usize,
     /// Their area, m².
     pub new_area_m2: f64,

@@ -49,8 +49,7 @@ impl Pairs {
             self.common_areas(polygon.data, &later)
         };
         let all: Vec<Overlap> = polygons.par_iter().flat_map_iter(of_polygon).collect();
-        let new: Vec<&Overlap> =
-            all.iter().filter(|o| !o.is_more(o.before_m2) && o.is_more(o.after_m2)).collect();
+        let new: Vec<&Overlap> = all.iter().filter(|overlap| overlap.is_new()).collect();
         Overlaps {
             before: all.iter().filter(|o| o.is_more(o.before_m2)).count(),
             after: all.iter().filter(|o| o.is_more(o.after_m2)).count(),
@@ -107,6 +106,11 @@ struct Overlap {
 impl Overlap {
     fn is_more(&self, area_m2: f64) -> bool {
         area_m2 > self.sliver_m2
+    }
+
+    /// A sliver that grows over the limit by less than another one is none: it was there.
+    fn is_new(&self) -> bool {
+        !self.is_more(self.before_m2) && self.is_more(self.after_m2 - self.before_m2)
     }
 
     fn is_sliver(&self, area_m2: f64) -> bool {
@@ -199,5 +203,13 @@ mod tests {
         assert!((overlaps(0.0).new_area_m2 - 0.005).abs() < 1e-9);
         assert_eq!((overlaps(0.1).new, overlaps(0.1).new_slivers), (0, 1));
         assert_eq!(overlaps(0.1).new_area_m2, 0.0);
+    }
+
+    #[test]
+    fn a_sliver_that_grows_a_little_is_not_new() {
+        let of = |before_m2, after_m2| Overlap { before_m2, after_m2, sliver_m2: SLIVER_M2 }.is_new();
+        assert!(!of(0.997e-6, 1.002e-6));
+        assert!(of(0.997e-6, 2.1e-6) && of(0.0, 1.1e-6));
+        assert!(!of(0.0, 0.9e-6) && !of(1.0, 2.0));
     }
 }
