@@ -1,6 +1,6 @@
 //! Rigid bodies: polygons that share vertices or walls move as one, shifted and turned but not bent.
 
-use crate::map::Map;
+use crate::{disjoint_sets::DisjointSets, map::Map};
 use std::collections::BTreeMap;
 
 /// A group of polygons of more vertices stays free: moved as one, it would carry as little as one building.
@@ -40,20 +40,20 @@ impl Bodies {
     /// The groups of polygons of `map`; `touching` are vertices that lie on segments: a corner on the wall of another
     /// polygon joins the two.
     pub(crate) fn find(map: &Map, touching: impl Iterator<Item = (u32, [u32; 2])>) -> Self {
-        let mut first = map.polygons.to_vec();
-        let in_polygon = sizes(&first);
+        let in_polygon = sizes(map.polygons);
+        let mut groups = DisjointSets::new(map.polygons.len());
+        (0..).zip(map.polygons).for_each(|(v, &first)| groups.join(v, first));
         for (vertex, [a, b]) in touching {
             let wall = map.polygons[a as usize] == map.polygons[b as usize];
             if wall && [vertex, a].iter().all(|&v| in_polygon[map.polygons[v as usize] as usize] > 1) {
-                let (p, q) = (root(&mut first, vertex), root(&mut first, a));
-                first[p.max(q) as usize] = p.min(q);
+                groups.join(vertex, a);
             }
         }
         let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        (0..first.len() as u32).for_each(|v| members.entry(root(&mut first, v)).or_default().push(v));
+        let mut number = vec![FREE; map.polygons.len()];
+        (0..).zip(groups.roots()).for_each(|(v, root)| members.entry(root).or_default().push(v));
         let groups = members.into_values().filter(|members| (2..=MOST_VERTICES).contains(&members.len()));
         let bodies: Vec<Body> = groups.map(|members| Body::new(map, members)).collect();
-        let mut number = vec![FREE; first.len()];
         for (body, Body { members, .. }) in bodies.iter().enumerate() {
             members.iter().for_each(|&v| number[v as usize] = body as u32);
         }
@@ -69,14 +69,6 @@ impl Bodies {
     pub fn of(&self, vertex: u32) -> Option<usize> {
         self.number.get(vertex as usize).filter(|number| **number != FREE).map(|number| *number as usize)
     }
-}
-
-fn root(first: &mut [u32], mut v: u32) -> u32 {
-    while first[v as usize] != v {
-        first[v as usize] = first[first[v as usize] as usize];
-        v = first[v as usize];
-    }
-    v
 }
 
 /// How many vertices have each as their first one.

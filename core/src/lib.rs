@@ -42,6 +42,7 @@ pub mod code;
 pub mod constraints;
 pub mod deformation;
 pub mod demodulation;
+pub mod disjoint_sets;
 pub mod distortion;
 pub mod embedding;
 mod error;

@@ -4,6 +4,7 @@
 use crate::{
     Error, Result,
     constraints::Constraints,
+    disjoint_sets::DisjointSets,
     map::Map,
     mesh::Mesh,
     nearness::{VertexTree, cross, dot},
@@ -315,22 +316,12 @@ fn cotangent(at: [[f64; 2]; 3], corner: usize) -> f64 {
     dot(u, v) / cross(u, v).abs().max(LEAST_HEIGHT * longest2)
 }
 
-/// The component number of every vertex of a patch, and how many components there are.
-fn components(patch: &Patch) -> (Vec<usize>, usize) {
-    let mut parent: Vec<usize> = (0..patch.vertices.len()).collect();
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
-    for &[a, b] in &patch.edges {
-        let (a, b) = (root(&mut parent, a as usize), root(&mut parent, b as usize));
-        parent[a.max(b)] = a.min(b);
-    }
-    let label: Vec<usize> = (0..parent.len()).map(|i| root(&mut parent, i)).collect();
-    let count = label.iter().enumerate().filter(|(i, l)| i == *l).count();
+/// The component of every vertex of a patch, by its first vertex, and how many components there are.
+fn components(patch: &Patch) -> (Vec<u32>, usize) {
+    let mut pieces = DisjointSets::new(patch.vertices.len());
+    patch.edges.iter().for_each(|&[a, b]| pieces.join(a, b));
+    let label = pieces.roots();
+    let count = (0..).zip(&label).filter(|(i, root)| i == *root).count();
     (label, count)
 }
 

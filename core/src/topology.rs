@@ -6,6 +6,7 @@
 use crate::{
     bodies::{Body, Motion},
     constraints::Constraints,
+    disjoint_sets::DisjointSets,
     junctions::JUNCTION_M,
     map::Map,
     motion::{Slack, keeps_apart},
@@ -220,7 +221,7 @@ fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 
 /// Movers that move together, as disjoint sets.
 struct Clusters {
-    parent: Vec<u32>,
+    sets: DisjointSets,
     /// By their roots. One body alone is a cluster, too: its turn may carry it through what hangs on it.
     clusters: BTreeMap<u32, Cluster>,
 }
@@ -233,16 +234,7 @@ struct Cluster {
 
 impl Clusters {
     fn new(vertices: usize) -> Self {
-        Clusters { parent: (0..vertices as u32).collect(), clusters: BTreeMap::new() }
-    }
-
-    fn root(&mut self, mut vertex: u32) -> u32 {
-        while self.parent[vertex as usize] != vertex {
-            let above = self.parent[self.parent[vertex as usize] as usize];
-            self.parent[vertex as usize] = above;
-            vertex = above;
-        }
-        vertex
+        Clusters { sets: DisjointSets::new(vertices), clusters: BTreeMap::new() }
     }
 
     /// Joins the vertices of every hit and raises the level of the clusters they come to be in: their roots.
@@ -250,20 +242,20 @@ impl Clusters {
     fn merge(&mut self, hits: impl Iterator<Item = Vec<u32>>) -> BTreeSet<u32> {
         let (mut joined, mut again) = (BTreeSet::new(), Vec::new());
         for movers in hits {
-            let roots: BTreeSet<u32> = movers.iter().map(|&v| self.root(v)).collect();
+            let roots: BTreeSet<u32> = movers.iter().map(|&v| self.sets.root(v)).collect();
             if roots.len() == 1 && self.clusters.contains_key(&movers_root(&roots)) {
                 again.push(movers_root(&roots));
             } else {
                 joined.insert(self.join(roots));
             }
         }
-        let joined: BTreeSet<u32> = joined.into_iter().map(|root| self.root(root)).collect();
+        let joined: BTreeSet<u32> = joined.into_iter().map(|root| self.sets.root(root)).collect();
         for &root in &joined {
             let cluster = self.clusters.get_mut(&root).expect("it was joined");
             cluster.level = cluster.level.clamp(1, RIGID);
         }
         let mut touched = joined.clone();
-        let again: BTreeSet<u32> = again.into_iter().map(|root| self.root(root)).collect();
+        let again: BTreeSet<u32> = again.into_iter().map(|root| self.sets.root(root)).collect();
         for root in again.difference(&joined) {
             let cluster = self.clusters.get_mut(root).expect("it was joined before");
             if cluster.level < FROZEN {
@@ -282,7 +274,7 @@ impl Clusters {
         let mut all = self.clusters.remove(&largest).unwrap_or_else(|| single(largest));
         for root in roots.into_iter().filter(|&root| root != largest) {
             let other = self.clusters.remove(&root).unwrap_or_else(|| single(root));
-            self.parent[root as usize] = largest;
+            self.sets.put_under(root, largest);
             all.members.extend(other.members);
             all.level = all.level.max(other.level);
         }

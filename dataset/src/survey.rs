@@ -8,7 +8,7 @@ use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
-use meshmark_core::{ground::Ground, map::Map, vertices::VertexTable};
+use meshmark_core::{disjoint_sets::DisjointSets, ground::Ground, map::Map, vertices::VertexTable};
 
 /// Which attributes become labels. With labels come shapes: both are for registration.
 #[derive(Debug, Clone, Copy)]
@@ -100,9 +100,9 @@ impl Survey {
             .collect();
         segments.sort_unstable();
         segments.dedup();
-        let mut joined = Joined::none(vertices.len());
+        let mut joined = DisjointSets::new(vertices.len());
         indices.iter().zip(&self.polygons).for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
-        let polygons = joined.firsts();
+        let polygons = joined.roots();
         let places = bring(self.labels.iter().map(|label| label.point).collect())?;
         let in_shapes = bring(self.shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect())?;
         let (mut labels, mut shapes) = (self.labels.clone(), self.shapes.clone());
@@ -216,7 +216,7 @@ fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
 
 /// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
 fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) -> Vec<u32> {
-    let mut joined = Joined::none(vertices);
+    let mut joined = DisjointSets::new(vertices);
     let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
     let mut shell = 0;
     for ((&start, end), kind) in starts.iter().zip(ends).zip(kinds) {
@@ -227,33 +227,7 @@ fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) ->
         }
         indices[start as usize..end].iter().for_each(|&v| joined.join(v, shell));
     }
-    joined.firsts()
-}
-
-/// Sets of vertices, each known by its first one (union-find).
-struct Joined(Vec<u32>);
-
-impl Joined {
-    fn none(vertices: usize) -> Self {
-        Joined((0..vertices as u32).collect())
-    }
-
-    fn root(&mut self, mut v: u32) -> u32 {
-        while self.0[v as usize] != v {
-            self.0[v as usize] = self.0[self.0[v as usize] as usize];
-            v = self.0[v as usize];
-        }
-        v
-    }
-
-    fn join(&mut self, v: u32, w: u32) {
-        let (a, b) = (self.root(v), self.root(w));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-
-    fn firsts(mut self) -> Vec<u32> {
-        (0..self.0.len() as u32).map(|v| self.root(v)).collect()
-    }
+    joined.roots()
 }
 
 struct Walk<'a> {

@@ -14,7 +14,7 @@ as_owner() {
 
 start_server() {
     programs=$(dirname "$(find /usr/lib/postgresql -path '*/bin/initdb' | sort -V | tail -1)")
-    server=$(mktemp -d /tmp/meshmark-postgis.XXXXXX)
+    server=$(mktemp -d -t meshmark.XXXXXX)
     [ "$(id -u)" -ne 0 ] || chown postgres: "$server"
     (
         cd "$server"

@@ -95,20 +95,22 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, &dataset, reading, Target::Own)
 }
 
-/// Reads a map for a comparison: its geometries in order, and metres on the ground.
-pub fn compared(
-    what: &str,
-    path: &Path,
-    layers: Option<&[String]>,
-) -> Result<(Vec<FeatureGeometry>, Ground)> {
+/// The geometries of a map in order, for a comparison.
+pub fn geometries(what: &str, path: &Path, layers: Option<&[String]>) -> Result<Vec<FeatureGeometry>> {
     let dataset = open(what, path, None)?;
-    let reading = Reading { layers, srs: None, landmarks: LabelFields::None };
-    let ground = read(what, path, &dataset, &reading, Target::Own)?.ground();
-    let failed =
-        |error: meshmark_dataset::Error| Error::Unreadable(format!("the {what} {}: {error}", path.display()));
     *last_failure() = None;
-    let geometries = features(&dataset, layers, &|| last_failure().clone()).map_err(failed)?;
-    Ok((geometries, ground.map_err(failed)?))
+    let found = features(&dataset, layers, &|| last_failure().clone());
+    found.map_err(|error| of_map(what, path, &error))
+}
+
+/// Metres on the ground of the reference of a comparison.
+pub fn ground(path: &Path, layers: Option<&[String]>) -> Result<Ground> {
+    let survey = reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None })?;
+    survey.ground().map_err(|error| of_map("reference", path, &error))
+}
+
+fn of_map(what: &str, path: &Path, error: &meshmark_dataset::Error) -> Error {
+    Error::Unreadable(format!("the {what} {}: {error}", path.display()))
 }
 
 /// A misspelt field would leave no landmark, and nobody would know why.

@@ -135,8 +135,9 @@ pub fn compare(
     layers: Option<&[String]>,
     precision: Option<f64>,
 ) -> Result<Comparison> {
-    let (before, ground) = reading::compared("reference", reference, layers)?;
-    let (after, _) = reading::compared("marked map", marked, layers)?;
+    let ground = reading::ground(reference, layers)?;
+    let before = reading::geometries("reference", reference, layers)?;
+    let after = reading::geometries("marked map", marked, layers)?;
     if before.len() != after.len() {
         let (b, a) = (before.len(), after.len());
         return Err(Error::Usage(format!(
