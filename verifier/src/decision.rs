@@ -4,9 +4,9 @@
 //! the sum Σ p_i b′_i a_i then has mean 0 and variance Σ a_i², whatever happened to the map, so the score is
 //! standard normal (a sum of thousands of independent signs; its tail is at most 3.18 times the normal
 //! one, Bentkus and Dzindzalieta 2015). *Is it this recipient?* Under the right key, an unrelated
-//! recipient has a random message: b′ᵀb̂ over the channel bits has mean 0 and variance |b̂|². With
+//! recipient has a random message: Σ w_j b′_j b̂_j over the channel bits has mean 0 and variance |w b̂|². With
 //! `CODE=LDPC` b′ is a random code word, not independent signs: any four of its bits are independent, and over random
-//! messages the tail is that of the normal distribution (tests of core's `code.rs`). The larger p counts.
+//! messages the tail is that of the normal distribution (tests of core's `demodulation.rs`). The larger p counts.
 
 use crate::survival;
 use meshmark_core::{
