@@ -8,7 +8,11 @@ PREFIX ?= /usr/local
 # GDAL's own plugin folder, where every program finds the driver without a variable.
 GDAL_PLUGIN_DIR ?= $(shell pkg-config --variable=libdir gdal 2>/dev/null || echo $(PREFIX)/lib)/gdalplugins
 # What the studies below run on; name your own with MAPS="a.gpkg folder".
-BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/jp_tokyo_adachi_6km.gpkg)
+BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/kz_astana_city.gpkg \
+	../shared/maps/large/jp_tokyo_adachi_6km.gpkg)
+# Also so many copies of the last of BENCH_MAPS side by side: 2.8 and 10 million vertices.
+BENCH_TILES ?= 4,14
+BENCH_PYTHON := target/bench-python/bin/python
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
@@ -25,9 +29,18 @@ test: build
 demo: build
 	GDAL_DRIVER_PATH=$(CURDIR)/$(PLUGINS) ./demo.sh $(BUILD)/meshmark fixtures/helsinki.gpkg
 
-bench: build
+# About half an hour for the maps of docs/performance.md.
+bench: build $(BENCH_PYTHON)
 	$(CARGO) build --release --locked -p meshmark-host-tests --bins
-	$(BUILD)/bench $(or $(MAPS),$(BENCH_MAPS),$(FIXTURES))
+	$(BUILD)/bench --out target/bench --tiles $(BENCH_TILES) --script $(BENCH_PYTHON) host-tests/peers/mesh_spectral.py \
+		$(or $(MAPS),$(BENCH_MAPS),$(FIXTURES))
+	$(CARGO) bench --locked -p meshmark-host-tests --bench kernels
+
+$(BENCH_PYTHON): host-tests/peers/requirements.txt
+	./install-deps.sh python3-venv libopenblas-dev
+	python3 -m venv target/bench-python
+	$(BENCH_PYTHON) -m pip install --quiet -r $<
+	touch $@
 
 # The paper's Table 2 and more, on maps in metres; about an hour for the nine maps of docs/evaluation.md.
 table2: build

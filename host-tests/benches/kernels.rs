@@ -1,17 +1,22 @@
 //! The kernels against their rivals, on one thread: `cargo bench -p meshmark-host-tests --bench kernels`.
 //!
 //! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go. LAPACK is
-//! that of Debian's OpenBLAS, a program of its own; without the package libopenblas-dev its row is missing.
+//! that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not installed is left out: the
+//! packages libopenblas-dev, libcgal-dev, and what `make bench` installs for Python.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::{Mat, Par, Side};
 use gdal::Dataset;
 use meshmark_core::{
+    ground::Ground,
+    mesh::Mesh,
     options::Parameters,
     patches::{Patch, Patches},
     spectrum::Basis,
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Target, survey};
+use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
+use meshmark_host_tests::cgal;
+use meshmark_verifier::matching::Matcher;
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -20,6 +25,8 @@ use std::{
 };
 
 const MAP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/helsinki.gpkg");
+const MATCHING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/matching.py");
+const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/bench-python/bin/python");
 const DSYEVD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/dsyevd.c");
 
 /// Patches of the default profile and of one with a coefficient per channel bit: vertices, columns.
@@ -48,7 +55,48 @@ fn eigen_solve(criterion: &mut Criterion) {
     group.finish();
 }
 
-fn first_patch(patch_size: usize) -> Patch {
+fn delaunay(criterion: &mut Criterion) {
+    let points = points();
+    let mut group = criterion.benchmark_group("delaunay");
+    group.bench_function("ours", |b| b.iter(|| Mesh::delaunay(&points).expect("points of a map")));
+    match cgal::build(Path::new(env!("CARGO_TARGET_TMPDIR"))) {
+        Ok(program) => drop(group.bench_function("CGAL", |b| {
+            let seconds = || cgal::delaunay_seconds(&program, &points).expect("it was just compiled");
+            b.iter_custom(|times| Duration::from_secs_f64((0..times).map(|_| seconds()).sum()));
+        })),
+        Err(reason) => eprintln!("CGAL is left out: {reason}"),
+    }
+    group.finish();
+}
+
+/// Every vertex's counterpart in a copy whose vertices were moved by less than the radius.
+fn matching(criterion: &mut Criterion) {
+    const RADIUS_M: f64 = 1.0;
+    let points = points();
+    let shift = |(i, p): (usize, &[f64; 2])| {
+        let angle = i as f64;
+        [p[0] + 0.3 * angle.cos(), p[1] + 0.3 * angle.sin()]
+    };
+    let moved: Vec<[f64; 2]> = points.iter().enumerate().map(shift).collect();
+    let ground = Ground::Plane { metres_per_unit: 1.0 };
+    let mut group = criterion.benchmark_group("matching");
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let ours = || one_thread.install(|| Matcher::new(&points, &ground, [0.0, 0.0]).all(&moved, RADIUS_M));
+    group.bench_function("ours", |b| b.iter(ours));
+    match Path::new(PYTHON).exists() {
+        true => drop(group.bench_function("SciPy", |b| {
+            let numbers: Vec<f64> = [&points, &moved].into_iter().flatten().flatten().copied().collect();
+            b.iter_custom(|times| {
+                let mut command = Command::new(PYTHON);
+                time_program(command.args([MATCHING, &RADIUS_M.to_string(), &times.to_string()]), &numbers)
+            });
+        })),
+        false => eprintln!("SciPy is left out: {PYTHON} is missing, `make bench` makes it"),
+    }
+    group.finish();
+}
+
+fn survey_of(map: &str) -> Survey {
     let selection = Selection {
         layers: None,
         srs: None,
@@ -57,9 +105,18 @@ fn first_patch(patch_size: usize) -> Patch {
         most_vertices: MOST_VERTICES,
         last_failure: &|| None,
     };
-    let map = survey(&Dataset::open(MAP).expect("the fixture opens"), &selection).expect("and is a map");
+    survey(&Dataset::open(map).expect("the fixture opens"), &selection).expect("and is a map")
+}
+
+/// The vertices of a map, metres from its middle.
+fn points() -> Vec<[f64; 2]> {
+    survey_of(MAP).vertices.local(1.0)
+}
+
+fn first_patch(patch_size: usize) -> Patch {
+    let survey = survey_of(MAP);
     let parameters = Parameters { patch_size, ..Parameters::default() };
-    let map = map.map().expect("with metres");
+    let map = survey.map().expect("with metres");
     let patches = Patches::new(&map, &parameters).expect("of enough vertices");
     patches.as_slice()[0].clone()
 }
@@ -88,20 +145,22 @@ fn compile(source: &Path) -> Result<PathBuf, String> {
 }
 
 fn time_dsyevd(program: &Path, matrix: &[f64], repetitions: u64) -> Duration {
-    let mut child = Command::new(program)
-        .args([matrix.len().isqrt().to_string(), repetitions.to_string()])
-        .env("OPENBLAS_NUM_THREADS", "1")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("it was just compiled");
-    let bytes: Vec<u8> = matrix.iter().flat_map(|value| value.to_ne_bytes()).collect();
+    let mut command = Command::new(program);
+    command.args([matrix.len().isqrt().to_string(), repetitions.to_string()]);
+    time_program(command.env("OPENBLAS_NUM_THREADS", "1"), matrix)
+}
+
+/// Hands numbers to a program that prints how many seconds it took.
+fn time_program(command: &mut Command, numbers: &[f64]) -> Duration {
+    let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = piped.spawn().expect("a program that was found");
+    let bytes: Vec<u8> = numbers.iter().flat_map(|value| value.to_ne_bytes()).collect();
     child.stdin.take().expect("stdin is piped").write_all(&bytes).expect("it reads all of it");
     let output = child.wait_with_output().expect("it ends");
-    assert!(output.status.success(), "dsyevd failed");
+    assert!(output.status.success(), "{command:?} failed");
     let seconds = String::from_utf8_lossy(&output.stdout).trim().parse().expect("seconds");
     Duration::from_secs_f64(seconds)
 }
 
-criterion_group!(kernels, eigen_solve);
+criterion_group!(kernels, eigen_solve, delaunay, matching);
 criterion_main!(kernels);

@@ -3,6 +3,8 @@
 // stdin:  u64 N, then N points as f64 x, f64 y         (little endian)
 // stdout: u64 E, then E edges as u32 i, u32 j, i < j   (little endian), finite edges only, sorted
 //
+// With the argument "time" it writes instead how many seconds the edges took, as text.
+//
 // Points given more than once are one vertex, which bears the first of their indices.
 // Any failure is a sentence on stderr and exit status 1.
 
@@ -13,6 +15,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -20,6 +23,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -100,10 +104,21 @@ void write_edges(const std::vector<Edge>& edges) {
         throw std::runtime_error("stdout cannot be written");
 }
 
+void write_seconds(const std::vector<Point>& points) {
+    const auto start = std::chrono::steady_clock::now();
+    const auto edges = delaunay_edges(points);
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    if (edges.empty() || std::printf("%.9f\n", elapsed.count()) < 0)
+        throw std::runtime_error("there is nothing to time");
+}
+
 } // namespace
 
-int main() try {
-    write_edges(delaunay_edges(read_points()));
+int main(int argc, char** argv) try {
+    if (argc > 1 && std::string_view(argv[1]) == "time")
+        write_seconds(read_points());
+    else
+        write_edges(delaunay_edges(read_points()));
 } catch (const std::exception& error) {
     std::fprintf(stderr, "delaunay_edges: %s\n", error.what());
     return 1;

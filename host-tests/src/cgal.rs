@@ -51,18 +51,34 @@ fn compile(program: &Path) -> Result<(), String> {
 /// # Errors
 /// A sentence when `program` (see [`build`]) cannot be run or reports a failure.
 pub fn delaunay_edges(program: &Path, points: &[[f64; 2]]) -> Result<Vec<[u32; 2]>, String> {
-    let output = run(program, &encode(points)).map_err(|e| format!("{}: {e}", program.display()))?;
-    if !output.status.success() {
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        return Err(format!("{} ({})", stderr.trim_end(), output.status));
+    let answer = ask(Command::new(program), points)?;
+    decode(&answer).ok_or_else(|| "CGAL's answer is not as long as it says".to_string())
+}
+
+/// How many seconds CGAL takes for them, without starting the program and handing over the points.
+///
+/// # Errors
+/// As [`delaunay_edges`].
+pub fn delaunay_seconds(program: &Path, points: &[[f64; 2]]) -> Result<f64, String> {
+    let mut command = Command::new(program);
+    command.arg("time");
+    let answer = ask(command, points)?;
+    String::from_utf8_lossy(&answer).trim().parse().map_err(|error| format!("CGAL's time: {error}"))
+}
+
+fn ask(mut command: Command, points: &[[f64; 2]]) -> Result<Vec<u8>, String> {
+    let output = run(&mut command, &encode(points)).map_err(|e| format!("{command:?}: {e}"))?;
+    if output.status.success() {
+        return Ok(output.stdout);
     }
-    decode(&output.stdout).ok_or_else(|| "CGAL's answer is not as long as it says".to_string())
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    Err(format!("{} ({})", stderr.trim_end(), output.status))
 }
 
 /// The program reads all of stdin before it writes, so writing first cannot block for ever.
-fn run(program: &Path, input: &[u8]) -> std::io::Result<Output> {
+fn run(command: &mut Command, input: &[u8]) -> std::io::Result<Output> {
     let piped = || Stdio::piped();
-    let mut child = Command::new(program).stdin(piped()).stdout(piped()).stderr(piped()).spawn()?;
+    let mut child = command.stdin(piped()).stdout(piped()).stderr(piped()).spawn()?;
     let written = child.stdin.take().expect("stdin is piped").write_all(input);
     let output = child.wait_with_output()?;
     match written {
