@@ -12,11 +12,13 @@ BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/
 	../shared/maps/large/jp_tokyo_adachi_6km.gpkg)
 # Also so many copies of the last of BENCH_MAPS side by side: 2.8 and 10 million vertices.
 BENCH_TILES ?= 4,14
+WHEEL_PYTHON := target/wheel/python/bin/python
 BENCH_PYTHON := target/bench-python/bin/python
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts install uninstall fixtures deps lint
+.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts plugin-for-wheel deb install \
+	uninstall fixtures deps lint
 
 build: deps
 	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
@@ -65,14 +67,32 @@ faults: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped, Python and QGIS; installs them.
-hosts: build
+# A PostGIS of its own, started and stopped, Python, QGIS, the examples, a clean Debian; installs what they need.
+hosts: build plugin-for-wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
 	host-tests/hosts/qgis.sh
+	host-tests/hosts/examples.sh
+	host-tests/hosts/deb.sh
 
 fixtures:
 	fixtures/make_fixtures.sh
+
+# The driver for the GDAL 3.12 in the wheel of pyogrio; PYTHON= names a Python that has one.
+ifeq ($(PYTHON),)
+plugin-for-wheel: $(WHEEL_PYTHON)
+endif
+plugin-for-wheel: deps
+	packaging/plugin_for_wheel.sh "$(or $(PYTHON),$(WHEEL_PYTHON))" target/wheel
+
+$(WHEEL_PYTHON):
+	./install-deps.sh python3-venv curl
+	python3 -m venv target/wheel/python
+	$@ -m pip install --quiet pyogrio==0.13.0 geopandas==1.1.1
+
+deb: build
+	./install-deps.sh dpkg-dev
+	packaging/deb.sh $(BUILD) target/deb
 
 install: build
 	install -d "$(DESTDIR)$(GDAL_PLUGIN_DIR)" "$(DESTDIR)$(PREFIX)/bin"

@@ -73,3 +73,10 @@ grep -q 'FORMAT=PostgreSQL is not a format that a marked map is written to' "$wo
     fail "the refusal does not say why: $(cat "$work/log")"
 [ "$(tables)" -eq "$before" ] && [ ! -e second.gpkg ] || fail "a refused target was written to"
 passed "PostgreSQL is refused as a target"
+
+printf 'ACME GmbH\nBeta Oy\n' >recipients.txt
+"$root/examples/postgis_recipients.sh" "$connection" buildings key.json recipients.txt copies >"$work/log" 2>&1 ||
+    fail "postgis_recipients.sh: $(cat "$work/log")"
+for number in 1 2; do
+    verify "postgis_recipients.sh" copies/reference.gpkg "copies/copy_$number.gpkg" --record "copies/copy_$number.json"
+done

@@ -1,6 +1,7 @@
 //! The command line: flags in, exit code out.
 
-use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand};
+use crate::package_files;
+use clap::{Arg, ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use meshmark_core::{
     key::{RECIPIENT_BITS, SecretKey},
     message::Message,
@@ -11,7 +12,10 @@ use meshmark_verifier::{
     Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::compare,
     explain::Inputs, progress::Progress, reading, registration::Start, verify, verify::check_key,
 };
-use std::{io::Write, path::PathBuf};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
 
 const MARKING: &str = "Maps are marked by GDAL's ogr2ogr: ogr2ogr -f GPKG marked.gpkg MESHMARK:map.gpkg \
                        -oo KEY=key.json -oo RECIPIENT=\"ACME GmbH\" -oo RECORD=acme.json";
@@ -42,6 +46,12 @@ enum Subcommands {
     /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
     /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large.
     Compare(CompareArgs),
+    /// Write man pages and shell completions, for those who make packages
+    #[command(hide = true)]
+    PackageFiles {
+        /// The folder to write them to
+        folder: PathBuf,
+    },
 }
 
 #[derive(Args)]
@@ -160,6 +170,7 @@ pub fn run() -> ExitCode {
         Subcommands::Keygen { key_file } => keygen(&key_file),
         Subcommands::Verify(args) => run_verify(*args),
         Subcommands::Compare(args) => run_compare(&args),
+        Subcommands::PackageFiles { folder } => write_package_files(&folder),
     };
     result.unwrap_or_else(|error| {
         eprintln!("meshmark: {error}");
@@ -190,6 +201,13 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
         return Err(failed(error));
     }
     println!("key {} written to {}", key.id(), path.display());
+    Ok(ExitCode::Match)
+}
+
+fn write_package_files(folder: &Path) -> Result<ExitCode> {
+    package_files::write(Cli::command(), folder).map_err(|error| {
+        Error::Usage(format!("man pages and completions cannot be written to {}: {error}", folder.display()))
+    })?;
     Ok(ExitCode::Match)
 }
 
