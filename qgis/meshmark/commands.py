@@ -80,19 +80,23 @@ def run(arguments, feedback, on_output=lambda text: None):
     ]
     for reader in readers:
         reader.start()
-    while True:
-        try:
-            process.wait(PATIENCE)
-            break
-        except subprocess.TimeoutExpired:
-            pass
-        on_output(output.decode(errors="replace"))
-        if feedback.isCanceled():
-            _stop(process)
-            raise Cancelled()
-    for reader in readers:
-        reader.join()
+    with process:
+        while _is_running(process):
+            on_output(output.decode(errors="replace"))
+            if feedback.isCanceled():
+                _stop(process)
+                raise Cancelled()
+        for reader in readers:
+            reader.join()
     return Finished(process.returncode, output.decode(errors="replace"), errors.decode(errors="replace"))
+
+
+def _is_running(process):
+    try:
+        process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        return True
+    return False
 
 
 def _drain(stream, into):

@@ -21,7 +21,7 @@ class Snapshot:
     """What a layer shows now, with its filter and unsaved edits: made by the main thread, read by any."""
 
     def __init__(self, layer):
-        self.name = layer.name()
+        self.name = own_name(layer)
         self.fields = layer.fields()
         self.type = layer.wkbType()
         self.crs = layer.crs()
@@ -30,6 +30,14 @@ class Snapshot:
 
     def features(self):
         return self._source.getFeatures(QgsFeatureRequest())
+
+
+def own_name(layer):
+    """What a layer is called; that of its table where QGIS only named it after the file."""
+    source = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
+    table, file = source.get("layerName"), os.path.basename(source.get("path") or "")
+    generated = [os.path.splitext(file)[0], f"{os.path.splitext(file)[0]} — {table}"]
+    return table if table and layer.name() in generated else layer.name()
 
 
 def file_of(layer):

@@ -12,6 +12,8 @@ from .text import tr
 
 NUMBER = QgsProcessingParameterNumber.Type
 SWITCH = ["NO", "YES"]
+# Of numbers that may be in degrees; those with a default are metres.
+DECIMALS = 9
 
 
 def labels():
@@ -47,6 +49,7 @@ def parameter(option):
         default = None if optional else convert(option.default)
         bounds = [convert(bound) for bound in (option.least, option.most) if bound is not None]
         made = QgsProcessingParameterNumber(option.name, label, kind, default, optional, *bounds)
+        made.setMetadata({"widget_wrapper": {"decimals": 3 if option.default else DECIMALS}})
     else:
         made = QgsProcessingParameterString(option.name, label, option.default, False, optional)
     made.setHelp(option.help)

@@ -15,6 +15,7 @@ class MeshmarkPlugin:
         self.provider = None
         self.factory = None
         self.action = None
+        self.dialog = None
 
     def initProcessing(self):
         """All that `qgis_process` needs."""
@@ -45,4 +46,9 @@ class MeshmarkPlugin:
 
         selected = self.iface.layerTreeView().selectedLayers() or [self.iface.activeLayer()]
         ids = [layer.id() for layer in selected if isinstance(layer, QgsMapLayer) and layer.type() == QgsMapLayerType.VectorLayer]
-        processing.execAlgorithmDialog("meshmark:export", {"LAYERS": ids})
+        ready, missing = QgsApplication.processingRegistry().algorithmById("meshmark:export").canExecute()
+        if not ready:
+            self.iface.messageBar().pushCritical("meshmark", missing)
+            return
+        self.dialog = processing.createAlgorithmDialog("meshmark:export", {"LAYERS": ids})
+        self.dialog.show()

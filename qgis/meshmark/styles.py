@@ -16,7 +16,7 @@ from qgis.PyQt.QtGui import QColor
 
 from .text import tr
 
-MILLIMETRES = QgsUnitTypes.RenderUnit.RenderMillimeters
+MILLIMETRES = QgsUnitTypes.RenderMillimeters
 # An arrow of average length on the screen.
 ARROW_MM = 3.0
 
@@ -60,16 +60,19 @@ def arrow(colour, scale):
     shaft.setHeadThickness(0.5)
     fill = QgsFillSymbol.createSimple({"color": colour, "outline_style": "no"})
     shaft.setSubSymbol(fill)
+    line = QgsLineSymbol()
+    line.changeSymbolLayer(0, shaft)
     shift = QgsVectorFieldSymbolLayer()
     shift.setXAttribute("dx_m")
     shift.setYAttribute("dy_m")
     shift.setScale(scale)
     shift.setDistanceUnit(MILLIMETRES)
-    shift.setSubSymbol(QgsLineSymbol([shaft]))
+    shift.setSubSymbol(line)
     dot = QgsSimpleMarkerSymbolLayer(size=0.7)
     dot.setColor(QColor(colour))
     dot.setStrokeColor(QColor(colour))
-    symbol = QgsMarkerSymbol([dot])
+    symbol = QgsMarkerSymbol()
+    symbol.changeSymbolLayer(0, dot)
     symbol.appendSymbolLayer(shift)
     return symbol
 

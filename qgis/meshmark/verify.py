@@ -88,7 +88,7 @@ class Verify(Algorithm):
             QgsProcessingParameterBoolean("OPEN_REPORT", tr("Open the report"), True),
             tr("Shows the report in the web browser when it is written."),
         )
-        self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no_match or inconclusive")))
+        self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
         self.addOutput(QgsProcessingOutputString("REASON", tr("Why")))
         self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Recipient the verdict is about")))
         self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of error, its decimal logarithm")))
@@ -169,7 +169,7 @@ def answer(finished, codes, feedback):
 
 def summary(found):
     """The answer in a few lines."""
-    verdicts = {"match": tr("MATCH"), "no_match": tr("NO MATCH"), "inconclusive": tr("INCONCLUSIVE")}
+    verdicts = {"match": tr("MATCH"), "no-match": tr("NO MATCH"), "inconclusive": tr("INCONCLUSIVE")}
     yield f"{verdicts.get(found['verdict'], found['verdict'])}: {found['reason']}"
     recipient, p_log10 = found["parameters"]["recipient"], found["p_value_log10"]
     if recipient and found["verdict"] == "match":
