@@ -10,9 +10,10 @@ GDAL_PLUGIN_DIR ?= $(shell pkg-config --variable=libdir gdal 2>/dev/null || echo
 # What the studies below run on; name your own with MAPS="a.gpkg folder".
 BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/jp_tokyo_adachi_6km.gpkg)
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
+QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts install uninstall fixtures deps lint
+.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts qgis install uninstall fixtures deps lint
 
 build: deps
 	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
@@ -57,6 +58,11 @@ hosts: build
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
 	host-tests/hosts/qgis.sh
+	host-tests/hosts/qgis_plugin.sh
+
+# The zip for QGIS's plugin manager: the same bytes for the same sources.
+qgis:
+	@qgis/make_zip.py qgis/meshmark "$(QGIS_ZIP)"
 
 fixtures:
 	fixtures/make_fixtures.sh

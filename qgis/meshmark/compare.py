@@ -10,7 +10,7 @@ from qgis.core import (
     QgsProcessingParameterVectorLayer,
 )
 
-from . import commands
+from . import commands, reports
 from .algorithm import Algorithm, file_of_map
 from .text import tr
 from .verify import answer
@@ -51,6 +51,7 @@ class Compare(Algorithm):
             QgsProcessingParameterNumber("PRECISION", tr("Precision, CRS units"), kind, None, True, 0),
             tr("Grid of the marked map: overlaps up to a cell of it count as slivers."),
         )
+        reports.add_parameters(self)
         for name, label, _ in figures():
             self.addOutput(QgsProcessingOutputNumber(name, label))
 
@@ -60,8 +61,9 @@ class Compare(Algorithm):
         return True
 
     def processAlgorithm(self, given, context, feedback):
+        self._report = reports.Report(self, given, context, feedback)
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
-            arguments = [commands.meshmark(), "compare", "--json"]
+            arguments = [commands.meshmark(), "compare", "--json", *self._report.options()]
             names = self.parameterAsString(given, "LAYERS", context)
             arguments += ["--layers", names] if names else []
             if given.get("PRECISION") is not None:
@@ -73,7 +75,11 @@ class Compare(Algorithm):
         results = {name: found[section][figure] for name, _, (section, figure) in figures()}
         for name, label, _ in figures():
             feedback.pushInfo(f"{label}: {results[name]:.6g}")
-        return results
+        return {**results, "REPORT": self._report.path} if self._report.path else results
+
+    def postProcessAlgorithm(self, context, feedback):
+        self._report.open()
+        return {}
 
 
 def figures():

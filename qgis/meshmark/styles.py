@@ -3,34 +3,30 @@
 from qgis.core import (
     QgsArrowSymbolLayer,
     QgsFillSymbol,
+    QgsGeometryGeneratorSymbolLayer,
     QgsLineSymbol,
-    QgsMarkerSymbol,
     QgsProcessingLayerPostProcessorInterface,
     QgsRuleBasedRenderer,
-    QgsSimpleMarkerSymbolLayer,
-    QgsUnitTypes,
-    QgsVectorFieldSymbolLayer,
     QgsVectorLayerUtils,
 )
 from qgis.PyQt.QtGui import QColor
 
 from .text import tr
 
-MILLIMETRES = QgsUnitTypes.RenderMillimeters
-# An arrow of average length on the screen.
-ARROW_MM = 3.0
+# The average arrow on the screen, metres.
+ARROW_M = 0.003
 
 
-def vertices(layer):
-    """Arrows of the displacements; the weight is how well one fits in with those around it."""
+def displacements(layer):
+    """Arrows, exaggerated to a readable length at any scale; the weight is how well one fits in with those around it."""
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
-    scale = ARROW_MM / rms_m if rms_m > 0 else 1.0
+    exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
     return rules(
         [
-            (tr("fits in with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", scale)),
-            (tr("fits in with them less well"), '"weight" >= 0.5 AND "weight" < 0.9', arrow("#e69f00", scale)),
-            (tr("does not fit in: edited, or matched wrongly"), '"weight" < 0.5', arrow("#d55e00", scale)),
+            (tr("fits in with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
+            (tr("fits in with them less well"), '"weight" >= 0.5 AND "weight" < 0.9', arrow("#e69f00", exaggeration)),
+            (tr("does not fit in: edited, or matched wrongly"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
         ]
     )
 
@@ -54,26 +50,21 @@ def rules(entries):
     return QgsRuleBasedRenderer(root)
 
 
-def arrow(colour, scale):
-    shaft = QgsArrowSymbolLayer.create({"is_curved": "0", "arrow_width": "0.25", "arrow_start_width": "0.25"})
-    shaft.setHeadLength(0.9)
-    shaft.setHeadThickness(0.5)
-    fill = QgsFillSymbol.createSimple({"color": colour, "outline_style": "no"})
-    shaft.setSubSymbol(fill)
+def arrow(colour, exaggeration):
+    shaft = QgsArrowSymbolLayer.create(
+        {"is_curved": "0", "arrow_width": "0.25", "arrow_start_width": "0.25", "head_length": "0.9", "head_thickness": "0.5"}
+    )
+    shaft.setSubSymbol(QgsFillSymbol.createSimple({"color": colour, "outline_style": "no"}))
     line = QgsLineSymbol()
     line.changeSymbolLayer(0, shaft)
-    shift = QgsVectorFieldSymbolLayer()
-    shift.setXAttribute("dx_m")
-    shift.setYAttribute("dy_m")
-    shift.setScale(scale)
-    shift.setDistanceUnit(MILLIMETRES)
-    shift.setSubSymbol(line)
-    dot = QgsSimpleMarkerSymbolLayer(size=0.7)
-    dot.setColor(QColor(colour))
-    dot.setStrokeColor(QColor(colour))
-    symbol = QgsMarkerSymbol()
-    symbol.changeSymbolLayer(0, dot)
-    symbol.appendSymbolLayer(shift)
+    end = " + ".join(["{0}(start_point($geometry))", "({1}) * ({0}(end_point($geometry)) - {0}(start_point($geometry)))"])
+    ends = ", ".join(end.format(axis, exaggeration) for axis in "xy")
+    longer = QgsGeometryGeneratorSymbolLayer.create(
+        {"geometryModifier": f"make_line(start_point($geometry), make_point({ends}))", "SymbolType": "Line"}
+    )
+    longer.setSubSymbol(line)
+    symbol = QgsLineSymbol()
+    symbol.changeSymbolLayer(0, longer)
     return symbol
 
 
@@ -101,4 +92,4 @@ _STYLERS = {}
 
 def processor(name):
     """The post-processor of the layer of this name."""
-    return _STYLERS.setdefault(name, Styler({"vertices": vertices, "patches": patches}[name]))
+    return _STYLERS.setdefault(name, Styler({"vertex_displacements": displacements, "patches": patches}[name]))

@@ -1,7 +1,6 @@
 """Verify suspect map: what `meshmark verify` says, its report, and the evidence as layers."""
 
 import json
-import os
 import tempfile
 
 from qgis.core import (
@@ -10,15 +9,12 @@ from qgis.core import (
     QgsProcessingException,
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
-    QgsProcessingParameterBoolean,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterVectorLayer,
 )
-from qgis.PyQt.QtCore import QUrl
-from qgis.PyQt.QtGui import QDesktopServices
 
-from . import commands, settings, styles
+from . import commands, reports, settings, styles
 from .algorithm import Algorithm, file_of_map, sentences
 from .text import tr
 
@@ -36,8 +32,8 @@ class Verify(Algorithm):
         return tr(
             "Says whether a suspect map is a copy that was marked with your key, and whose. Given one record it tests that "
             "copy, given a folder of records it finds the recipient. The result is a verdict with the probability that it is "
-            "wrong, a report, and two layers: the matched vertices with arrows of their displacements, coloured by how well "
-            "they fit in with their neighbours, and the patches of the mesh with the evidence of each."
+            "wrong, a report, and two layers: an arrow for the displacement of every matched vertex, coloured by how well "
+            "it fits in with its neighbours, and the patches of the mesh with the evidence of each."
         )
 
     def needs(self):
@@ -76,18 +72,9 @@ class Verify(Algorithm):
             QgsProcessingParameterFileDestination(
                 "EVIDENCE_MAP", tr("Evidence map"), tr("GeoPackage (*.gpkg)"), optional=True, createByDefault=True
             ),
-            tr("GeoPackage to write the matched vertices and the patches to, which are added to the project."),
+            tr("GeoPackage to write the displacements of the matched vertices and the patches to; both are added to the project."),
         )
-        self.add(
-            QgsProcessingParameterFileDestination(
-                "REPORT", tr("Report"), tr("HTML files (*.html)"), optional=True, createByDefault=True
-            ),
-            tr("A report to read, print and hand on; it holds no secret."),
-        )
-        self.add(
-            QgsProcessingParameterBoolean("OPEN_REPORT", tr("Open the report"), True),
-            tr("Shows the report in the web browser when it is written."),
-        )
+        reports.add_parameters(self)
         self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
         self.addOutput(QgsProcessingOutputString("REASON", tr("Why")))
         self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Recipient the verdict is about")))
@@ -113,15 +100,11 @@ class Verify(Algorithm):
 
     def processAlgorithm(self, given, context, feedback):
         evidence = self.parameterAsFileOutput(given, "EVIDENCE_MAP", context)
-        report = self.parameterAsFileOutput(given, "REPORT", context)
-        if report and not commands.has_option("verify", "--report"):
-            feedback.pushWarning(tr("This version of the command meshmark writes no report: install a later one."))
-            report = ""
-        outputs = [("--evidence-map", evidence), ("--report", report)]
+        self._report = reports.Report(self, given, context, feedback)
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
             arguments = [commands.meshmark(), "verify", "--json"]
             arguments += ["--key", self.parameterAsString(given, "KEY", context), *self._marks(given, context)]
-            arguments += [word for option, path in outputs if path for word in (option, path)]
+            arguments += (["--evidence-map", evidence] if evidence else []) + self._report.options()
             arguments += ["--reference", file_of_map(self._reference, staging, "reference", context, feedback)]
             arguments += ["--", file_of_map(self._suspect, staging, "suspect", context, feedback)]
             feedback.setProgressText(tr("Verifying"))
@@ -130,7 +113,6 @@ class Verify(Algorithm):
             feedback.pushInfo(line)
         if evidence and context.project():
             self._add_layers(evidence, context)
-        self._report = report if self.parameterAsBool(given, "OPEN_REPORT", context) else ""
         results = {
             "VERDICT": found["verdict"],
             "REASON": found["reason"],
@@ -138,21 +120,18 @@ class Verify(Algorithm):
             "P_VALUE_LOG10": found["p_value_log10"],
             "MATCHED_VERTICES": found["vertices"]["matched"],
         }
-        written = {"EVIDENCE_MAP": evidence, "REPORT": report}
+        written = {"EVIDENCE_MAP": evidence, "REPORT": self._report.path}
         return {**results, **{name: path for name, path in written.items() if path}}
 
     def _add_layers(self, evidence, context):
-        # Of several layers the last one is drawn above the others, and they come in the order of their sources.
-        for layer, title in [("patches", tr("Patches")), ("vertices", tr("Matched vertices"))]:
+        # They are added in the order of their names, the later one above the other.
+        for layer, title in [("vertex_displacements", tr("Displacements of matched vertices")), ("patches", tr("Patches"))]:
             details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
             details.setPostProcessor(styles.processor(layer))
             context.addLayerToLoadOnCompletion(f"{evidence}|layername={layer}", details)
 
     def postProcessAlgorithm(self, context, feedback):
-        from qgis.utils import iface
-
-        if iface is not None and self._report and os.path.exists(self._report):
-            QDesktopServices.openUrl(QUrl.fromLocalFile(self._report))
+        self._report.open()
         return {}
 
 

@@ -100,7 +100,7 @@ struct VerifyArgs {
     /// Say in sentences what was compared, found and not tested
     #[arg(long, conflicts_with = "json")]
     explain: bool,
-    /// GeoPackage to write: the matched vertices with their displacements, and the patches with their scores
+    /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with their scores
     #[arg(long, value_name = "FILE")]
     evidence_map: Option<PathBuf>,
     #[command(flatten)]

@@ -5,7 +5,7 @@ use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
 };
-use meshmark_core::{carrier::Carrier, demodulation::Demodulation, patches::Patches};
+use meshmark_core::{carrier::Carrier, demodulation::Demodulation, ground::Ground, patches::Patches};
 use meshmark_dataset::{CoordinateSystem, Survey};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -28,7 +28,9 @@ pub struct FoundVertex {
     pub at: [f64; 2],
     /// The patch it is in.
     pub patch: usize,
-    /// From there to where it was found, metres on the ground.
+    /// Where it was found, CRS units.
+    pub to: [f64; 2],
+    /// From there to there, metres on the ground.
     pub moved_m: [f64; 2],
     /// 1, or less where the displacement does not fit in with the others.
     pub weight: f64,
@@ -56,11 +58,12 @@ pub struct EvidenceMap {
     pub patches: Vec<PatchEvidence>,
     /// Place and patch of every reference vertex, until the vertices are added.
     places: Vec<([f64; 2], usize)>,
+    ground: Ground,
 }
 
 impl EvidenceMap {
     /// Before anything was found.
-    pub fn new(reference: &Survey, patches: &Patches) -> Self {
+    pub fn new(reference: &Survey, ground: Ground, patches: &Patches) -> Self {
         let coords = reference.vertices.coords();
         let mut places: Vec<([f64; 2], usize)> = coords.iter().map(|at| (*at, 0)).collect();
         for (number, patch) in patches.as_slice().iter().enumerate() {
@@ -72,7 +75,7 @@ impl EvidenceMap {
             score: None,
         };
         let patches = patches.as_slice().iter().map(of_patch).collect();
-        EvidenceMap { crs: reference.crs.clone(), vertices: Vec::new(), patches, places }
+        EvidenceMap { crs: reference.crs.clone(), vertices: Vec::new(), patches, places, ground }
     }
 
     /// Adds the vertices that were found and says how many they are.
@@ -81,7 +84,9 @@ impl EvidenceMap {
             followed.observed.iter().zip(&followed.weights).zip(&self.places)
         {
             let Some(moved_m) = *moved_m else { continue };
-            self.vertices.push(FoundVertex { at: *at, patch: *patch, moved_m, weight: *weight });
+            let unit = self.ground.metres_per_unit(*at);
+            let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];
+            self.vertices.push(FoundVertex { at: *at, to, patch: *patch, moved_m, weight: *weight });
             self.patches[*patch].found += 1;
         }
         self.vertices.len()
@@ -90,7 +95,8 @@ impl EvidenceMap {
     /// The same with the score of every patch for the message that is expected.
     pub fn scored(&self, request: &Request, found: Option<&Demodulation>) -> Self {
         let (vertices, patches) = (self.vertices.clone(), self.patches.clone());
-        let mut scored = EvidenceMap { crs: self.crs.clone(), vertices, patches, places: Vec::new() };
+        let mut scored =
+            EvidenceMap { crs: self.crs.clone(), vertices, patches, places: Vec::new(), ground: self.ground };
         if let Some((found, message)) = found.zip(request.expected.as_ref()) {
             let carrier = Carrier::new(&request.key);
             let scores = found.patch_scores(&carrier, message, self.patches.len());
@@ -99,7 +105,7 @@ impl EvidenceMap {
         scored
     }
 
-    /// Writes a GeoPackage with the layers `vertices` and `patches`.
+    /// Writes a GeoPackage with the layers `vertex_displacements`, a line for every matched vertex, and `patches`.
     ///
     /// # Errors
     /// It cannot be written.
@@ -116,12 +122,12 @@ impl EvidenceMap {
     fn write_layers(&self, path: &Path) -> gdal::errors::Result<()> {
         gdal::config::set_thread_local_config_option("OGR_CURRENT_DATE", NO_TIME)?;
         let mut dataset = DriverManager::get_driver_by_name("GPKG")?.create_vector_only(path)?;
-        self.write_vertices(&mut dataset)?;
+        self.write_displacements(&mut dataset)?;
         self.write_patches(&mut dataset)?;
         dataset.close()
     }
 
-    fn write_vertices(&self, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+    fn write_displacements(&self, dataset: &mut Dataset) -> gdal::errors::Result<()> {
         use OGRFieldType::{OFTInteger, OFTReal};
         let fields = [
             ("patch", OFTInteger),
@@ -130,14 +136,16 @@ impl EvidenceMap {
             ("moved_m", OFTReal),
             ("weight", OFTReal),
         ];
-        let (kind, rows) = (OGRwkbGeometryType::wkbPoint, self.vertices.iter());
-        self.write_layer(dataset, ("vertices", kind), &fields, rows, |vertex, feature| {
+        let (kind, rows) = (OGRwkbGeometryType::wkbLineString, self.vertices.iter());
+        self.write_layer(dataset, ("vertex_displacements", kind), &fields, rows, |vertex, feature| {
             let [dx, dy] = vertex.moved_m;
             feature.set_field_integer(0, vertex.patch as i32)?;
             for (field, value) in (1..).zip([dx, dy, dx.hypot(dy), vertex.weight]) {
                 feature.set_field_double(field, value)?;
             }
-            points(kind, &[vertex.at])
+            let mut line = Geometry::empty(kind)?;
+            [vertex.at, vertex.to].into_iter().for_each(|[x, y]| line.add_point_2d((x, y)));
+            Ok(line)
         })
     }
 
@@ -153,7 +161,7 @@ impl EvidenceMap {
             if let Some(score) = patch.score {
                 feature.set_field_double(3, score)?;
             }
-            points(OGRwkbGeometryType::wkbMultiPoint, &patch.vertices)?.convex_hull()
+            points(&patch.vertices)?.convex_hull()
         })
     }
 
@@ -180,13 +188,9 @@ impl EvidenceMap {
     }
 }
 
-fn points(kind: OGRwkbGeometryType::Type, places: &[[f64; 2]]) -> gdal::errors::Result<Geometry> {
-    let mut geometry = Geometry::empty(kind)?;
+fn points(places: &[[f64; 2]]) -> gdal::errors::Result<Geometry> {
+    let mut geometry = Geometry::empty(OGRwkbGeometryType::wkbMultiPoint)?;
     for [x, y] in places {
-        if kind == OGRwkbGeometryType::wkbPoint {
-            geometry.add_point_2d((*x, *y));
-            continue;
-        }
         let mut point = Geometry::empty(OGRwkbGeometryType::wkbPoint)?;
         point.add_point_2d((*x, *y));
         geometry.add_geometry(point)?;

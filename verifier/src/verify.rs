@@ -171,7 +171,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         suspect_crs,
         found: Err(unregistered(&vertices, chance, start)),
         decoys: None,
-        evidence_map: EvidenceMap::new(reference, &patches),
+        evidence_map: EvidenceMap::new(reference, ground, &patches),
     };
     if matches.count >= LEAST_MATCHED && matches.count >= TIMES_CHANCE * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));

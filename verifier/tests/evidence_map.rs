@@ -46,7 +46,7 @@ fn every_matched_vertex_is_there_and_every_patch_has_its_score() {
     let [rows, least_m, most_m, off] = numbers(
         &map,
         "SELECT count(*), min(moved_m), max(moved_m), max(abs(moved_m * moved_m - dx_m * dx_m - dy_m * dy_m)) \
-         FROM vertices",
+         FROM vertex_displacements",
     );
     assert_eq!(rows as u64, matched);
     assert!(least_m >= 0.0 && most_m <= 0.75 && off < 1e-12, "no vertex of the fixture moved further");
@@ -77,5 +77,5 @@ fn a_suspect_that_is_elsewhere_makes_patches_without_vertices() {
     verify(&fixture("helsinki.gpkg"), &map);
     let [patches, found, scores] = numbers(&map, "SELECT count(*), sum(found), count(score) FROM patches");
     assert!(patches > 0.0 && found == 0.0 && scores == 0.0);
-    assert_eq!(numbers(&map, "SELECT count(*) FROM vertices"), [0.0]);
+    assert_eq!(numbers(&map, "SELECT count(*) FROM vertex_displacements"), [0.0]);
 }
