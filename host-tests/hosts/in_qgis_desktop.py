@@ -12,7 +12,7 @@ import processing
 from osgeo import gdal
 from processing.gui.AlgorithmDialog import AlgorithmDialog
 from qgis.core import QgsApplication, QgsProject, QgsRectangle, QgsSettings
-from qgis.PyQt.QtCore import QTimer, Qt
+from qgis.PyQt.QtCore import Qt, QTimer
 from qgis.PyQt.QtGui import QColor, QImage
 from qgis.PyQt.QtWidgets import QApplication, QDockWidget, QToolBar
 from qgis.utils import iface
@@ -68,9 +68,7 @@ def open_dialog():
 
 
 def export_by_context_menu():
-    layers = [
-        iface.addVectorLayer(f"{WORK}/map.gpkg|layername={name}", name, "ogr") for name in ("buildings", "roads")
-    ]
+    layers = [iface.addVectorLayer(f"{WORK}/map.gpkg|layername={name}", name, "ogr") for name in ("buildings", "roads")]
     iface.layerTreeView().setCurrentLayer(layers[0])
     iface.layerTreeView().selectAll()
     context_menu_entry().trigger()
@@ -80,7 +78,12 @@ def export_by_context_menu():
     assert set(parameters["LAYERS"]) == {layer.source() for layer in layers}, parameters
     assert parameters["KEY"] == f"{WORK}/key.json", "the default is not that of the settings"
     assert parameters["AMPLITUDE"] == 0.1 and parameters["SHAPE"] == "FREE", parameters
-    for_picture = {"RECIPIENT": "ACME GmbH", "KEY": "/maps/key.json", "RECORDS": "/maps/records", "OUTPUT": "/maps/acme.gpkg"}
+    for_picture = {
+        "RECIPIENT": "ACME GmbH",
+        "KEY": "/maps/key.json",
+        "RECORDS": "/maps/records",
+        "OUTPUT": "/maps/acme.gpkg",
+    }
     dialog.mainWidget().setParameters(for_picture)
     dialog.resize(980, 700)
     picture(dialog, "qgis-export.png")
@@ -125,7 +128,9 @@ def verify():
     for layer in (vertices, patches):
         assert layer.renderer().type() == "RuleRenderer", layer.renderer().type()
     order = [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()]
-    assert order.index("Displacements of matched vertices") < order.index("Patches"), f"patches hide the vertices: {order}"
+    assert order.index("Displacements of matched vertices") < order.index(
+        "Patches"
+    ), f"patches hide the vertices: {order}"
     canvas = iface.mapCanvas()
     canvas.setExtent(patches.extent())
     picture(iface.mainWindow(), "qgis-evidence.png")

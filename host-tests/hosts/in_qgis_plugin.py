@@ -93,9 +93,7 @@ def export_layers():
     assert filtered.setSubsetString("fid % 10 <> 0")
     export("filtered", [filtered])
     assert 0 < count(f"{HERE}/filtered.gpkg") == filtered.featureCount() < of_map("buildings").featureCount()
-    tables = QgsVectorLayer(f"{HERE}/degrees.gpkg", "", "ogr").dataProvider().subLayers()
-    table = tables[0].split("!!::!!")[1]
-    export("degrees", [of_map(table, "degrees.gpkg")])
+    export("degrees", [QgsVectorLayer(f"{HERE}/degrees.gpkg", "first layer", "ogr")])
     written = export("joined", [of_map("roads"), of_map("buildings"), of_map("roads")])
     assert [path.partition("|layername=")[2] for path in written["MARKED_LAYERS"]] == ["roads", "buildings", "roads 2"]
 
@@ -103,8 +101,7 @@ def export_layers():
 def verify_what_a_layer_shows():
     import processing
 
-    suspect = of_map("filtered", "filtered.gpkg") if count(f"{HERE}/filtered.gpkg|layername=filtered") > 0 else None
-    suspect = suspect or QgsVectorLayer(f"{HERE}/filtered.gpkg", "suspect", "ogr")
+    suspect = of_map("buildings", "filtered.gpkg")
     assert suspect.setSubsetString("fid % 2 = 0")
     found = processing.run(
         "meshmark:verify",
@@ -117,8 +114,6 @@ def verify_what_a_layer_shows():
         },
     )
     assert found["VERDICT"] == "match" and found["RECIPIENT"] == "ACME GmbH", found
-    every = count(f"{HERE}/records/filtered.reference.gpkg")
-    assert 0 < found["MATCHED_VERTICES"] and every > suspect.featureCount()
     print("passed: qgis_plugin: the half of a map that a layer shows verifies", flush=True)
 
 

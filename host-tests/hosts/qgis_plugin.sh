@@ -42,12 +42,14 @@ maps="$PWD/Karten für ACME"
 mkdir "$maps" "$maps/records"
 cp "$fixture" "$maps/map.gpkg"
 marked="$maps/Straßen & Häuser.gpkg" base="$maps/records/Straßen & Häuser"
-export_two=("LAYERS=$maps/map.gpkg|layername=buildings" "LAYERS=$maps/map.gpkg|layername=roads" KEY="$PWD/key.json"
-    RECORDS="$maps/records" RECIPIENT="ACME GmbH")
-run export "${export_two[@]}" OUTPUT="$marked"
+two_layers=("LAYERS=$maps/map.gpkg|layername=buildings" "LAYERS=$maps/map.gpkg|layername=roads")
+export_two=("${two_layers[@]}" KEY="$PWD/key.json" RECORDS="$maps/records")
+acme=(RECIPIENT="ACME GmbH")
+run export "${export_two[@]}" "${acme[@]}" OUTPUT="$marked"
 says "export" "$base.json"
 verify "the plugin's export" "$base.reference.gpkg" "$marked" --record "$base.json"
 [ "$(ogrinfo -q "$marked" | cut -d' ' -f2 | tr '\n' ' ')" = "buildings roads " ] || fail "the layers are not those exported"
+cp "$marked" suspect.gpkg
 run export "${export_two[@]}" OUTPUT="$marked" RECIPIENT="Another Ltd" OVERWRITE=1
 says "a copy that is replaced" "$base-2.json"
 verify "a copy that is replaced" "$base.reference.gpkg" "$marked" --record "$base-2.json"
@@ -66,6 +68,16 @@ says "compare" "NEWLY_INVALID:	0"
 grep -q 'DISPLACEMENT_RMS_M:	0\.[01]' "$work/log" || fail "compare: the displacement is not that of a mark: $(cat "$work/log")"
 passed "compare gives its figures"
 
+# The commands of docs/qgis.md.
+mkdir example example/records
+cp "$fixture" example/map.gpkg
+mv suspect.gpkg example/
+cp key.json example/
+sed -n '/^```sh$/,/^```$/{//!p}' "$root/docs/qgis.md" | sed "s|^qgis_process.bin|'$qgis_process'|" >"$work/example.sh"
+(cd example && bash -e "$work/example.sh") >"$work/log" 2>&1 || fail "the commands of docs/qgis.md fail: $(cat "$work/log")"
+says "the commands of docs/qgis.md" "RECIPIENT:	ACME GmbH"
+verify "the commands of docs/qgis.md" example/records/acme.reference.gpkg example/acme.gpkg --record example/records/acme.json
+
 # What fails says why and leaves everything as it was.
 (cd "$maps" && find . -type f -exec sha256sum {} + | sort -k2) >"$work/before"
 refused() {
@@ -74,17 +86,17 @@ refused() {
     diff "$work/before" "$work/after" || fail "$1: files were changed or left"
     passed "$1: everything is as it was"
 }
-run export "${export_two[@]}" OUTPUT="$marked"
+run export "${export_two[@]}" "${acme[@]}" OUTPUT="$marked"
 refused "export, the file exists" "exists: choose another file, or let it be replaced (OVERWRITE)"
-run export "${export_two[@]}" OUTPUT="$maps/new.gpkg" KEY="$PWD/wrong.json"
+run export "${two_layers[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" KEY="$PWD/wrong.json" RECORDS="$maps/records"
 refused "export, a wrong key file" "wrong.json is not usable"
-run export "${export_two[@]}" OUTPUT="$maps/new.shp"
+run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.shp"
 refused "export, two layers to a Shapefile" "Shapefile"
-run export "${export_two[@]}" OUTPUT="$maps/new.gpkg" RECORDS="$maps/none"
+run export "${two_layers[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" KEY="$PWD/key.json" RECORDS="$maps/none"
 refused "export, no record folder" "none does not exist: make it, or choose another"
-run export "${export_two[@]}" OUTPUT="$maps/new.gpkg" MESSAGE=0011
+run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" MESSAGE=0011
 refused "export, recipient and message" "but not both"
-run export "${export_two[@]}" OUTPUT="$maps/new.gpkg" PATCH_SIZE=4096
+run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" PATCH_SIZE=4096
 refused "export, a map that is too small" "vertices"
 run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/wrong.json" RECORD="$base.json" \
     EVIDENCE_MAP="$maps/new.gpkg"
@@ -95,7 +107,7 @@ refused "verify, the evidence map exists" "exists: name another file"
 run compare ORIGINAL="$root/fixtures/helsinki.gpkg" MARKED="$marked"
 refused "compare, another map" "correspond"
 mkdir "$work/none"
-GDAL_DRIVER_PATH=$work/none run export "${export_two[@]}" OUTPUT="$maps/new.gpkg"
+GDAL_DRIVER_PATH=$work/none run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg"
 refused "export, the driver is missing" "The GDAL driver MESHMARK is not installed"
 PATH=${PATH#"$build:"} run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json" RECORD="$base.json"
 refused "verify, the command is missing" "The command meshmark is not installed"

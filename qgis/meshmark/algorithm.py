@@ -93,13 +93,15 @@ def file_of_map(given, folder, name, context, feedback):
 
 
 def sentences(errors):
-    """What programs of GDAL and meshmark printed as errors and warnings, without their prefixes."""
-    lines = [line.strip() for line in errors.splitlines() if line.strip()]
-    found, warned = [], []
-    for line in lines:
+    """What programs of GDAL and meshmark printed as errors and as warnings, without their prefixes."""
+    found, warned, other = [], [], []
+    for line in filter(None, map(str.strip, errors.splitlines())):
         kind, _, rest = line.partition(": ")
         if kind.startswith("Warning "):
             warned.append(rest)
+        elif kind.startswith("ERROR ") or kind == "meshmark":
+            found.append(rest)
         else:
-            found.append(rest if kind.startswith("ERROR ") or kind == "meshmark" else line)
-    return found, warned
+            other.append(line)
+    # The rest only says that it failed, when it is said why.
+    return found or other, warned

@@ -34,15 +34,17 @@ def meshmark():
     path = settings.get(settings.COMMAND)
     if path and not shutil.which(path):
         raise Missing(
-            tr("{} is not a program that can be run: correct the path of the command meshmark in Settings > Options > meshmark.")
-            .format(path)
+            tr(
+                "{} is not a program that can be run: correct the path of the command meshmark in Settings >"
+                " Options > meshmark."
+            ).format(path)
         )
     found = path or shutil.which("meshmark")
     if not found:
         raise Missing(
             tr(
-                "The command meshmark is not installed: install meshmark (package meshmark, or `make install` in its sources), "
-                "or name its path in Settings > Options > meshmark."
+                "The command meshmark is not installed: install meshmark (package meshmark, or `make install` in"
+                " its sources), or name its path in Settings > Options > meshmark."
             )
         )
     return found

@@ -24,9 +24,9 @@ class Compare(Algorithm):
 
     def about(self):
         return tr(
-            "Says what marking did to a map: how far vertices moved, how angles and areas changed, and whether anything became "
-            "invalid, overlaps or crosses that did not before. Features correspond by their order in each layer, vertices by "
-            "their order in each feature."
+            "Says what marking did to a map: how far vertices moved, how angles and areas changed, and whether"
+            " anything became invalid, overlaps or crosses that did not before. Features correspond by their order"
+            " in each layer, vertices by their order in each feature."
         )
 
     def needs(self):
@@ -36,7 +36,10 @@ class Compare(Algorithm):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
         self.add(
             QgsProcessingParameterVectorLayer("ORIGINAL", tr("Original map"), [vector]),
-            tr("The map before it was marked: the .reference.gpkg of the export, or its source. All layers of the file are used."),
+            tr(
+                "The map before it was marked: the .reference.gpkg of the export, or its source. All layers of the"
+                " file are used."
+            ),
         )
         self.add(
             QgsProcessingParameterVectorLayer("MARKED", tr("Marked map"), [vector]),

@@ -35,9 +35,9 @@ def find():
     searched = tr("it is not in {} either ({})").format(folder, reason or tr("no ogr_MESHMARK there")) if folder else ""
     raise Missing(
         tr(
-            "The GDAL driver MESHMARK is not installed for the GDAL {} of this QGIS{}: install meshmark built for this GDAL "
-            "(package meshmark, or `make install` in its sources), or name the folder of ogr_MESHMARK.so in Settings > "
-            "Options > meshmark."
+            "The GDAL driver MESHMARK is not installed for the GDAL {} of this QGIS{}: install meshmark built for"
+            " this GDAL (package meshmark, or `make install` in its sources), or name the folder of ogr_MESHMARK.so"
+            " in Settings > Options > meshmark."
         ).format(version, f", {searched}" if searched else "")
     )
 

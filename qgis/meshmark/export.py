@@ -36,10 +36,11 @@ class Export(Algorithm):
 
     def about(self):
         return tr(
-            "Writes a copy of one or more layers that carries an invisible message in centimetre shifts of its vertices. "
-            "All layers form one mesh and are marked together. The file appears when it is complete, was read back and "
-            "carries the message, or not at all. Beside it a record and a reference (the unmarked map) are written to the "
-            "record folder: keep both and the key, verification needs all three, and never hand them out."
+            "Writes a copy of one or more layers that carries an invisible message in centimetre shifts of its"
+            " vertices. All layers form one mesh and are marked together. The file appears when it is complete, was"
+            " read back and carries the message, or not at all. Beside it a record and a reference (the unmarked"
+            " map) are written to the record folder: keep both and the key, verification needs all three, and never"
+            " hand them out."
         )
 
     def needs(self):
@@ -92,7 +93,8 @@ class Export(Algorithm):
 
     def checkParameterValues(self, given, context):
         ok, message = super().checkParameterValues(given, context)
-        if ok and self._options and bool(given.get("RECIPIENT")) == bool(given.get("MESSAGE")):
+        subjects = [self.parameterAsString(given, name, context) for name in ("RECIPIENT", "MESSAGE")]
+        if ok and self._options and subjects.count("") != 1:
             return False, tr("Give a recipient, or a message instead of it, but not both.")
         return ok, message
 
@@ -123,7 +125,9 @@ class Export(Algorithm):
         marked = layers_of(output)
         if self.parameterAsBool(given, "ADD_TO_PROJECT", context) and context.project():
             for name, source in zip(names, marked):
-                details = QgsProcessingContext.LayerDetails(tr("{} (marked)").format(name), context.project(), "MARKED_LAYERS")
+                details = QgsProcessingContext.LayerDetails(
+                    tr("{} (marked)").format(name), context.project(), "MARKED_LAYERS"
+                )
                 context.addLayerToLoadOnCompletion(source, details)
         return {"OUTPUT": output, "MARKED_LAYERS": marked, "RECORD": record, "REFERENCE": reference}
 

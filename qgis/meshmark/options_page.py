@@ -14,7 +14,12 @@ def rows():
     file, folder = QgsFileWidget.StorageMode.GetFile, QgsFileWidget.StorageMode.GetDirectory
     return [
         (settings.COMMAND, tr("Command meshmark"), file, tr("the one on the path")),
-        (settings.DRIVER_FOLDER, tr("Folder of the GDAL driver (ogr_MESHMARK.so)"), folder, tr("GDAL's plugin folder")),
+        (
+            settings.DRIVER_FOLDER,
+            tr("Folder of the GDAL driver (ogr_MESHMARK.so)"),
+            folder,
+            tr("GDAL's plugin folder"),
+        ),
         (settings.KEY_FILE, tr("Key file, as the default of the dialogs"), file, tr("none")),
         (settings.RECORD_FOLDER, tr("Record folder, as the default of the dialogs"), folder, tr("none")),
     ]
@@ -33,7 +38,9 @@ class OptionsPage(QgsOptionsPageWidget):
             widget.lineEdit().setPlaceholderText(otherwise)
             layout.addRow(label, widget)
             self._widgets[name] = widget
-        note = QLabel(tr("The paths of the command and of the driver are only needed where they are not found by themselves."))
+        note = QLabel(
+            tr("The paths of the command and of the driver are only needed where they are not found by themselves.")
+        )
         note.setWordWrap(True)
         layout.addRow(note)
 

@@ -45,7 +45,11 @@ class MeshmarkPlugin:
         import processing
 
         selected = self.iface.layerTreeView().selectedLayers() or [self.iface.activeLayer()]
-        ids = [layer.id() for layer in selected if isinstance(layer, QgsMapLayer) and layer.type() == QgsMapLayerType.VectorLayer]
+        ids = [
+            layer.id()
+            for layer in selected
+            if isinstance(layer, QgsMapLayer) and layer.type() == QgsMapLayerType.VectorLayer
+        ]
         ready, missing = QgsApplication.processingRegistry().algorithmById("meshmark:export").canExecute()
         if not ready:
             self.iface.messageBar().pushCritical("meshmark", missing)

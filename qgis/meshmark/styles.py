@@ -18,14 +18,18 @@ ARROW_M = 0.003
 
 
 def displacements(layer):
-    """Arrows, exaggerated to a readable length at any scale; the weight is how well one fits in with those around it."""
+    """Arrows, exaggerated to a readable length at any scale; the weight is how well one fits in with the others."""
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
     exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
     return rules(
         [
             (tr("fits in with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
-            (tr("fits in with them less well"), '"weight" >= 0.5 AND "weight" < 0.9', arrow("#e69f00", exaggeration)),
+            (
+                tr("fits in with them less well"),
+                '"weight" >= 0.5 AND "weight" < 0.9',
+                arrow("#e69f00", exaggeration),
+            ),
             (tr("does not fit in: edited, or matched wrongly"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
         ]
     )
@@ -52,12 +56,20 @@ def rules(entries):
 
 def arrow(colour, exaggeration):
     shaft = QgsArrowSymbolLayer.create(
-        {"is_curved": "0", "arrow_width": "0.25", "arrow_start_width": "0.25", "head_length": "0.9", "head_thickness": "0.5"}
+        {
+            "is_curved": "0",
+            "arrow_width": "0.25",
+            "arrow_start_width": "0.25",
+            "head_length": "0.9",
+            "head_thickness": "0.5",
+        }
     )
     shaft.setSubSymbol(QgsFillSymbol.createSimple({"color": colour, "outline_style": "no"}))
     line = QgsLineSymbol()
     line.changeSymbolLayer(0, shaft)
-    end = " + ".join(["{0}(start_point($geometry))", "({1}) * ({0}(end_point($geometry)) - {0}(start_point($geometry)))"])
+    end = " + ".join(
+        ["{0}(start_point($geometry))", "({1}) * ({0}(end_point($geometry)) - {0}(start_point($geometry)))"]
+    )
     ends = ", ".join(end.format(axis, exaggeration) for axis in "xy")
     longer = QgsGeometryGeneratorSymbolLayer.create(
         {"geometryModifier": f"make_line(start_point($geometry), make_point({ends}))", "SymbolType": "Line"}

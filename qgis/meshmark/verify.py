@@ -30,10 +30,11 @@ class Verify(Algorithm):
 
     def about(self):
         return tr(
-            "Says whether a suspect map is a copy that was marked with your key, and whose. Given one record it tests that "
-            "copy, given a folder of records it finds the recipient. The result is a verdict with the probability that it is "
-            "wrong, a report, and two layers: an arrow for the displacement of every matched vertex, coloured by how well "
-            "it fits in with its neighbours, and the patches of the mesh with the evidence of each."
+            "Says whether a suspect map is a copy that was marked with your key, and whose. Given one record it"
+            " tests that copy, given a folder of records it finds the recipient. The result is a verdict with the"
+            " probability that it is wrong, a report, and two layers: an arrow for the displacement of every"
+            " matched vertex, coloured by how well it fits in with its neighbours, and the patches of the mesh with"
+            " the evidence of each."
         )
 
     def needs(self):
@@ -43,11 +44,17 @@ class Verify(Algorithm):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
         self.add(
             QgsProcessingParameterVectorLayer("REFERENCE", tr("Reference (the unmarked map)"), [vector]),
-            tr("The .reference.gpkg of the export, or the map that was marked, unchanged. All layers of the file are used."),
+            tr(
+                "The .reference.gpkg of the export, or the map that was marked, unchanged. All layers of the file"
+                " are used."
+            ),
         )
         self.add(
             QgsProcessingParameterVectorLayer("SUSPECT", tr("Suspect map"), [vector]),
-            tr("The map in question. All layers of its file are used; of a layer with a filter or unsaved edits, what it shows."),
+            tr(
+                "The map in question. All layers of its file are used; of a layer with a filter or unsaved edits,"
+                " what it shows."
+            ),
         )
         self.add(
             QgsProcessingParameterFile("KEY", tr("Key file"), defaultValue=settings.get(settings.KEY_FILE) or None),
@@ -72,7 +79,10 @@ class Verify(Algorithm):
             QgsProcessingParameterFileDestination(
                 "EVIDENCE_MAP", tr("Evidence map"), tr("GeoPackage (*.gpkg)"), optional=True, createByDefault=True
             ),
-            tr("GeoPackage to write the displacements of the matched vertices and the patches to; both are added to the project."),
+            tr(
+                "GeoPackage to write the displacements of the matched vertices and the patches to; both are added"
+                " to the project."
+            ),
         )
         reports.add_parameters(self)
         self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
@@ -125,7 +135,10 @@ class Verify(Algorithm):
 
     def _add_layers(self, evidence, context):
         # They are added in the order of their names, the later one above the other.
-        for layer, title in [("vertex_displacements", tr("Displacements of matched vertices")), ("patches", tr("Patches"))]:
+        for layer, title in [
+            ("vertex_displacements", tr("Displacements of matched vertices")),
+            ("patches", tr("Patches")),
+        ]:
             details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
             details.setPostProcessor(styles.processor(layer))
             context.addLayerToLoadOnCompletion(f"{evidence}|layername={layer}", details)
