@@ -68,12 +68,12 @@ says "compare" "NEWLY_INVALID:	0"
 grep -q 'DISPLACEMENT_RMS_M:	0\.[01]' "$work/log" || fail "compare: the displacement is not that of a mark: $(cat "$work/log")"
 passed "compare gives its figures"
 
-# The commands of docs/qgis.md.
+# The commands of docs/qgis.md, but for the first, which was given above.
 mkdir example example/records
 cp "$fixture" example/map.gpkg
 mv suspect.gpkg example/
 cp key.json example/
-sed -n '/^```sh$/,/^```$/{//!p}' "$root/docs/qgis.md" | sed "s|^qgis_process.bin|'$qgis_process'|" >"$work/example.sh"
+sed -n '/^```sh$/,/^```$/{//!p}' "$root/docs/qgis.md" | sed "/plugins enable/d; s|^qgis_process.bin|'$qgis_process'|" >"$work/example.sh"
 (cd example && bash -e "$work/example.sh") >"$work/log" 2>&1 || fail "the commands of docs/qgis.md fail: $(cat "$work/log")"
 says "the commands of docs/qgis.md" "RECIPIENT:	ACME GmbH"
 verify "the commands of docs/qgis.md" example/records/acme.reference.gpkg example/acme.gpkg --record example/records/acme.json
@@ -105,12 +105,26 @@ run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json
     EVIDENCE_MAP="$maps/evidence.gpkg"
 refused "verify, the evidence map exists" "exists: name another file"
 run compare ORIGINAL="$root/fixtures/helsinki.gpkg" MARKED="$marked"
-refused "compare, another map" "correspond"
+refused "compare, another map" "compare a map with the copy that was marked from it"
 mkdir "$work/none"
 GDAL_DRIVER_PATH=$work/none run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg"
 refused "export, the driver is missing" "The GDAL driver MESHMARK is not installed"
 PATH=${PATH#"$build:"} run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json" RECORD="$base.json"
 refused "verify, the command is missing" "The command meshmark is not installed"
+
+# Where the settings name them, driver and command need not be where they are looked for.
+mkdir -p "$profile/QGIS"
+cp "$profile/QGIS/QGIS3.ini" "$work/QGIS3.ini" 2>/dev/null || touch "$work/QGIS3.ini"
+printf '\n[meshmark]\ndriver_folder=%s\ncommand=%s\n' "$build/gdalplugins" "$meshmark" >>"$profile/QGIS/QGIS3.ini"
+(
+    export GDAL_DRIVER_PATH=$work/none PATH=${PATH#"$build:"}
+    run export "${export_two[@]}" "${acme[@]}" OUTPUT="$PWD/by_settings.gpkg"
+    run verify REFERENCE="$maps/records/by_settings.reference.gpkg" SUSPECT="$PWD/by_settings.gpkg" KEY="$PWD/key.json" \
+        RECORD="$maps/records/by_settings.json"
+    says "the settings" "VERDICT:	match"
+)
+passed "driver and command are found by the settings"
+cp "$work/QGIS3.ini" "$profile/QGIS/QGIS3.ini"
 
 cp "$root/fixtures/europe_deg.gpkg" degrees.gpkg
 cp "$fixture" map.gpkg
