@@ -13,7 +13,6 @@ from qgis.core import (
     QgsApplication,
     QgsProcessingException,
     QgsProcessingFeedback,
-    QgsProject,
     QgsVectorLayer,
 )
 
@@ -93,7 +92,7 @@ def export_layers():
     assert filtered.setSubsetString("fid % 10 <> 0")
     export("filtered", [filtered])
     assert 0 < count(f"{HERE}/filtered.gpkg") == filtered.featureCount() < of_map("buildings").featureCount()
-    export("degrees", [QgsVectorLayer(f"{HERE}/degrees.gpkg", "first layer", "ogr")])
+    export("degrees", [QgsVectorLayer(f"{HERE}/europe.gpkg", "first layer", "ogr")])
     written = export("joined", [of_map("roads"), of_map("buildings"), of_map("roads")])
     assert [path.partition("|layername=")[2] for path in written["MARKED_LAYERS"]] == ["roads", "buildings", "roads 2"]
 
@@ -122,7 +121,7 @@ def fail_without_a_trace():
     copying, marking = Cancelling("Copying the layers", 0), Cancelling("Marking", 0.3)
     fails("Cancelled: nothing was written", "cancelled", [buildings], copying)
     fails("Cancelled: nothing was written", "cancelled", [buildings], marking)
-    fails("must be", "wrong", [buildings], AMPLITUDE=1e9)
+    fails("Incorrect parameter value for AMPLITUDE", "wrong", [buildings], AMPLITUDE=1e9)
     fails("exists: choose another file", "memory", [buildings])
     fails("does not exist: make it", "none/other", [buildings])
 
@@ -130,8 +129,8 @@ def fail_without_a_trace():
 application = QgsApplication([], False)
 application.initQgis()
 Processing.initialize()
-QgsApplication.processingRegistry().addProvider(MeshmarkProvider())
-QgsProject.instance()
+provider = MeshmarkProvider()
+assert QgsApplication.processingRegistry().addProvider(provider)
 os.mkdir("records")
 export_layers()
 verify_what_a_layer_shows()

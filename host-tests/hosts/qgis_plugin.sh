@@ -126,7 +126,7 @@ printf '\n[meshmark]\ndriver_folder=%s\ncommand=%s\n' "$build/gdalplugins" "$mes
 passed "driver and command are found by the settings"
 cp "$work/QGIS3.ini" "$profile/QGIS/QGIS3.ini"
 
-cp "$root/fixtures/europe_deg.gpkg" degrees.gpkg
+cp "$root/fixtures/europe_deg.gpkg" europe.gpkg
 cp "$fixture" map.gpkg
 "${python[@]}" "$hosts/in_qgis_plugin.py" "$profile/python/plugins" 2>"$work/log" || fail "$(cat "$work/log")"
 for copy in memory filtered degrees joined; do
