@@ -26,11 +26,11 @@ def displacements(layer):
         [
             (tr("fits in with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
             (
-                tr("fits in with them less well"),
+                tr("fits in less well"),
                 '"weight" >= 0.5 AND "weight" < 0.9',
                 arrow("#e69f00", exaggeration),
             ),
-            (tr("does not fit in: edited, or matched wrongly"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
+            (tr("does not fit in"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
         ]
     )
 
@@ -39,10 +39,10 @@ def patches(_layer):
     """The score is standard normal under a wrong key: beyond 4 once in 30 000 patches."""
     return rules(
         [
-            (tr("the mark shows clearly (score of 6 and more)"), '"score" >= 6', area("#0072b2", 110)),
-            (tr("the mark shows (score of 3 to 6)"), '"score" >= 3 AND "score" < 6', area("#56b4e9", 90)),
-            (tr("says nothing by itself (score below 3)"), '"score" < 3', area("#f0e442", 60)),
-            (tr("not tested"), '"score" IS NULL', area("#999999", 30)),
+            (tr("mark shows clearly (6 and more)"), '"score" >= 6', area("#0072b2", 110)),
+            (tr("mark shows (3 to 6)"), '"score" >= 3 AND "score" < 6', area("#56b4e9", 90)),
+            (tr("too little to say (below 3)"), '"score" < 3', area("#f0e442", 60)),
+            (tr("not found, or not tested"), '"score" IS NULL', area("#999999", 30)),
         ]
     )
 

@@ -136,7 +136,7 @@ class Verify(Algorithm):
     def _add_layers(self, evidence, context):
         # They are added in the order of their names, the later one above the other.
         for layer, title in [
-            ("vertex_displacements", tr("Displacements of matched vertices")),
+            ("vertex_displacements", tr("Displacements")),
             ("patches", tr("Patches")),
         ]:
             details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
