@@ -11,8 +11,13 @@ from meshmark.provider import MeshmarkProvider
 from processing.core.Processing import Processing
 from qgis.core import (
     QgsApplication,
+    QgsFeature,
+    QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
+    QgsProcessingModelAlgorithm,
+    QgsProcessingModelChildAlgorithm,
+    QgsProcessingModelChildParameterSource,
     QgsVectorLayer,
 )
 
@@ -79,6 +84,14 @@ def memory_layer():
     return layer
 
 
+def layer_with_text_as_fid():
+    layer = QgsVectorLayer("Polygon?crs=EPSG:3067&field=fid:string", "text", "memory")
+    feature = QgsFeature(layer.fields())
+    feature.setAttributes(["first"])
+    layer.dataProvider().addFeatures([feature])
+    return layer
+
+
 def count(path):
     layer = QgsVectorLayer(path, "", "ogr")
     return layer.featureCount()
@@ -116,11 +129,44 @@ def verify_what_a_layer_shows():
     print("passed: qgis_plugin: the half of a map that a layer shows verifies", flush=True)
 
 
+def model():
+    """Export, then verify what was exported."""
+
+    def child(name, values):
+        algorithm = QgsProcessingModelChildAlgorithm(f"meshmark:{name}")
+        algorithm.setChildId(name)
+        for parameter, value in values.items():
+            algorithm.addParameterSources(parameter, [value])
+        return algorithm
+
+    value = QgsProcessingModelChildParameterSource.fromStaticValue
+    output = QgsProcessingModelChildParameterSource.fromChildOutput
+    places = {"KEY": value(f"{HERE}/key.json"), "RECORDS": value(f"{HERE}/records")}
+    subject = {"RECIPIENT": value("ACME GmbH"), "OUTPUT": value(f"{HERE}/model.gpkg")}
+    maps = {"REFERENCE": output("export", "REFERENCE"), "SUSPECT": output("export", "OUTPUT")}
+    made = QgsProcessingModelAlgorithm("mark and verify")
+    layers = value([f"{HERE}/map.gpkg|layername=buildings"])
+    made.addChildAlgorithm(child("export", {"LAYERS": layers, **subject, **places}))
+    made.addChildAlgorithm(child("verify", {**maps, "RECORD": output("export", "RECORD"), **places}))
+    return made
+
+
+def run_in_a_model():
+    context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
+    made = model()
+    made.initAlgorithm()
+    _, ok = made.run({}, context, feedback)
+    assert ok and "MATCH: " in feedback.textLog(), feedback.textLog()
+    print("passed: qgis_plugin: a model marks and verifies", flush=True)
+
+
 def fail_without_a_trace():
     buildings = of_map("buildings")
     copying, marking = Cancelling("Copying the layers", 0), Cancelling("Marking", 0.3)
     fails("Cancelled: nothing was written", "cancelled", [buildings], copying)
     fails("Cancelled: nothing was written", "cancelled", [buildings], marking)
+    fails("rename the field", "other", [layer_with_text_as_fid()])
+    fails("write a GPKG and convert it", "other", [buildings], OUTPUT=f"{HERE}/other.gml")
     fails("Incorrect parameter value for AMPLITUDE", "wrong", [buildings], AMPLITUDE=1e9)
     fails("exists: choose another file", "memory", [buildings])
     fails("does not exist: make it", "none/other", [buildings])
@@ -134,4 +180,5 @@ assert QgsApplication.processingRegistry().addProvider(provider)
 os.mkdir("records")
 export_layers()
 verify_what_a_layer_shows()
+run_in_a_model()
 fail_without_a_trace()

@@ -129,6 +129,7 @@ cp "$work/QGIS3.ini" "$profile/QGIS/QGIS3.ini"
 cp "$root/fixtures/europe_deg.gpkg" europe.gpkg
 cp "$fixture" map.gpkg
 "${python[@]}" "$hosts/in_qgis_plugin.py" "$profile/python/plugins" 2>"$work/log" || fail "$(cat "$work/log")"
+! grep -q Traceback "$work/log" || fail "the user sees a traceback: $(cat "$work/log")"
 for copy in memory filtered degrees joined; do
     verify "a copy of layers, $copy" "records/$copy.reference.gpkg" "$copy.gpkg" --record "records/$copy.json"
 done

@@ -1,14 +1,18 @@
 """What the three algorithms share."""
 
 import os
+import re
 
 from qgis.core import QgsProcessingAlgorithm, QgsProcessingException, QgsProcessingParameterDefinition
 from qgis.PyQt.QtGui import QIcon
 
 from . import layers
+from .commands import Cancelled
 from .driver import Missing
 from .text import tr
 
+# What ogr2ogr says after the driver said why.
+CONSEQUENCE = re.compile(r"MESHMARK driver failed to create ")
 ICON = os.path.join(os.path.dirname(__file__), "icon.svg")
 
 
@@ -71,8 +75,19 @@ class Algorithm(QgsProcessingAlgorithm):
             raise QgsProcessingException(str(missing)) from missing
         return self.prepare(parameters, context, feedback)
 
+    def processAlgorithm(self, parameters, context, feedback):
+        # QGIS shows a traceback of any exception but its own, subclasses included.
+        try:
+            return self.process(parameters, context, feedback)
+        except (Cancelled, Missing) as reason:
+            raise QgsProcessingException(str(reason)) from reason
+
     def prepare(self, parameters, context, feedback):
         """In the main thread, before the run: what has to do with layers of the project."""
+        raise NotImplementedError
+
+    def process(self, parameters, context, feedback):
+        """The run, in a thread of its own."""
         raise NotImplementedError
 
     def map_layer(self, parameters, name, context):
@@ -99,7 +114,7 @@ def sentences(errors):
         kind, _, rest = line.partition(": ")
         if kind.startswith("Warning "):
             warned.append(rest)
-        elif kind.startswith("ERROR ") or kind == "meshmark":
+        elif (kind.startswith("ERROR ") and not CONSEQUENCE.match(rest)) or kind == "meshmark":
             found.append(rest)
         else:
             other.append(line)

@@ -8,7 +8,7 @@ import sys
 import threading
 from collections import namedtuple
 
-from qgis.core import QgsApplication, QgsProcessingException
+from qgis.core import QgsApplication
 
 from . import driver, settings
 from .driver import Missing
@@ -22,7 +22,7 @@ PATIENCE = 0.1
 GRACE = 5
 
 
-class Cancelled(QgsProcessingException):
+class Cancelled(Exception):
     """The user cancelled, and the program was stopped."""
 
     def __init__(self):

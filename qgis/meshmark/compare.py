@@ -63,7 +63,7 @@ class Compare(Algorithm):
         self._marked = self.map_layer(given, "MARKED", context)
         return True
 
-    def processAlgorithm(self, given, context, feedback):
+    def process(self, given, context, feedback):
         self._report = reports.Report(self, given, context, feedback)
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
             arguments = [commands.meshmark(), "compare", "--json", *self._report.options()]

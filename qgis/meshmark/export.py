@@ -105,7 +105,7 @@ class Export(Algorithm):
         self._snapshots = [layers.Snapshot(layer) for layer in chosen]
         return True
 
-    def processAlgorithm(self, given, context, feedback):
+    def process(self, given, context, feedback):
         output = self.parameterAsFileOutput(given, "OUTPUT", context)
         values = {o.name: parameters.value(self, o, given, context) for o in self._options}
         folder = self.parameterAsString(given, "RECORDS", context)

@@ -82,7 +82,10 @@ def _copy_one(snapshot, name, path, context, progress):
 
 def _check(writer, name):
     if writer.hasError() != WRITERS.WriterError.NoError:
-        raise QgsProcessingException(tr("The layer {} cannot be copied: {}").format(name, writer.errorMessage()))
+        reason = writer.errorMessage()
+        if "fid" in reason:
+            reason += tr(" - a field fid must hold whole numbers, every one once: rename the field")
+        raise QgsProcessingException(tr("The layer {} cannot be copied: {}").format(name, reason))
 
 
 class _Progress:

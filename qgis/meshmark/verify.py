@@ -108,7 +108,7 @@ class Verify(Algorithm):
         self._suspect = self.map_layer(given, "SUSPECT", context)
         return True
 
-    def processAlgorithm(self, given, context, feedback):
+    def process(self, given, context, feedback):
         evidence = self.parameterAsFileOutput(given, "EVIDENCE_MAP", context)
         self._report = reports.Report(self, given, context, feedback)
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
