@@ -1,7 +1,6 @@
 """What the three algorithms share."""
 
 import os
-import re
 
 from qgis.core import QgsProcessingAlgorithm, QgsProcessingException, QgsProcessingParameterDefinition
 from qgis.PyQt.QtGui import QIcon
@@ -12,7 +11,7 @@ from .driver import Missing
 from .text import tr
 
 # What ogr2ogr says after the driver said why.
-CONSEQUENCE = re.compile(r"MESHMARK driver failed to create ")
+CONSEQUENCE = "MESHMARK driver failed to create "
 ICON = os.path.join(os.path.dirname(__file__), "icon.svg")
 
 
@@ -114,7 +113,7 @@ def sentences(errors):
         kind, _, rest = line.partition(": ")
         if kind.startswith("Warning "):
             warned.append(rest)
-        elif (kind.startswith("ERROR ") and not CONSEQUENCE.match(rest)) or kind == "meshmark":
+        elif (kind.startswith("ERROR ") and not rest.startswith(CONSEQUENCE)) or kind == "meshmark":
             found.append(rest)
         else:
             other.append(line)
