@@ -15,9 +15,10 @@ BENCH_TILES ?= 4,14
 WHEEL_PYTHON := target/wheel/python/bin/python
 BENCH_PYTHON := target/bench-python/bin/python
 STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
+QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts plugin-for-wheel deb install \
+.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -72,8 +73,13 @@ hosts: build plugin-for-wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
 	host-tests/hosts/qgis.sh
+	host-tests/hosts/qgis_plugin.sh
 	host-tests/hosts/examples.sh
 	host-tests/hosts/deb.sh
+
+# The zip for QGIS's plugin manager: the same bytes for the same sources.
+qgis:
+	@qgis/make_zip.py qgis/meshmark "$(QGIS_ZIP)"
 
 fixtures:
 	fixtures/make_fixtures.sh

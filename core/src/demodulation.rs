@@ -88,6 +88,26 @@ impl Demodulation {
         ratio(dot(&self.code.encode(message), &weighted), dot(&weighted, &weighted).sqrt())
     }
 
+    /// The [`Self::mark_score`] of each of `patches` patches by itself; `None` where nothing was observed to move.
+    pub fn patch_scores(&self, carrier: &Carrier, message: &Message, patches: usize) -> Vec<Option<f64>> {
+        let signs = self.code.encode(message);
+        let carriers = self.chip_correlations.len() / patches / 2;
+        let chip_rate = carriers / signs.len();
+        let score = |(patch, of_patch): (usize, &[f64])| {
+            let on_axis = |axis: usize| {
+                let seen = of_patch[axis * carriers..].iter().take(carriers);
+                let chips = carrier.chips(patch, axis, carriers);
+                let signed = |(i, (chip, a)): (usize, (f64, &f64))| {
+                    chip * signs[bit_of_coefficient(i + 1, chip_rate)] * a
+                };
+                chips.into_iter().zip(seen).enumerate().map(signed).sum::<f64>()
+            };
+            let deviation = dot(of_patch, of_patch).sqrt();
+            (deviation > 0.0).then(|| (on_axis(0) + on_axis(1)) / deviation)
+        };
+        self.chip_correlations.par_chunks(2 * carriers).enumerate().map(score).collect()
+    }
+
     /// The [`Self::mark_score`] of `count` decoy keys on the same suspect: random signs instead of chips, those
     /// of decoy k from ChaCha20 stream k.
     pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
@@ -434,6 +454,24 @@ mod tests {
             // 540 of a normal distribution, give or take 23.
             assert!((430..650).contains(&beyond), "{code:?}: {beyond} instead of 540");
         }
+    }
+
+    #[test]
+    fn the_scores_of_patches_add_up_to_that_of_the_map() {
+        let carrier = Carrier::new(&crate::key::SecretKey::from_bytes([3; 32]));
+        let message = Code::Repetition.decode(&[1.0, -1.0, 1.0]).message;
+        let mut found = found();
+        found.chip_correlations[24..36].fill(0.0); // patch 2
+        found.scores = vec![0.0; 3];
+        for (axis, a) in found.chip_correlations.chunks(6).enumerate() {
+            let chips = carrier.chips(axis / 2, axis % 2, 6);
+            (0..6).for_each(|i| found.scores[i / 2] += chips[i] * a[i]);
+        }
+        let scores = found.patch_scores(&carrier, &message, 50);
+        assert_eq!(scores.iter().position(Option::is_none), Some(2));
+        let deviations = found.chip_correlations.chunks(12).map(|a| dot(a, a).sqrt());
+        let sum: f64 = scores.iter().zip(deviations).map(|(score, d)| score.unwrap_or(0.0) * d).sum();
+        assert!((ratio(sum, found.null_deviation()) - found.mark_score(&message)).abs() < 1e-9);
     }
 
     #[test]

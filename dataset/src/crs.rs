@@ -21,6 +21,11 @@ impl CoordinateSystem {
         (!is_undefined).then(|| Self::new(srs))
     }
 
+    /// As GDAL has it.
+    pub fn spatial_ref(&self) -> &SpatialRef {
+        &self.0
+    }
+
     /// "EPSG:3067", or WKT when it has no code.
     pub fn label(&self) -> String {
         self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())

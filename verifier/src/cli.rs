@@ -10,7 +10,8 @@ use meshmark_core::{
 };
 use meshmark_verifier::{
     Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::compare,
-    explain::Inputs, progress::Progress, reading, registration::Start, verify, verify::check_key,
+    evidence_map::Target, explain::Inputs, progress::Progress, reading, registration::Start, verify,
+    verify::check_key,
 };
 use std::{
     io::Write,
@@ -109,6 +110,9 @@ struct VerifyArgs {
     /// Say in sentences what was compared, found and not tested
     #[arg(long, conflicts_with = "json")]
     explain: bool,
+    /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with their scores
+    #[arg(long, value_name = "FILE")]
+    evidence_map: Option<PathBuf>,
     #[command(flatten)]
     marking: MarkingFlags,
 }
@@ -221,6 +225,7 @@ fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
 fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let inputs = args.explain.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
     let (json, records, record) = (args.json, args.records.clone(), args.record.clone());
+    let evidence_map = args.evidence_map.as_deref().map(Target::new).transpose()?;
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut warn = |text: &str| eprintln!("meshmark: {text}");
@@ -228,6 +233,9 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
         Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
         None => verify(&request, &mut progress)?,
     };
+    if let Some(target) = evidence_map {
+        report.evidence_map.write(&target)?;
+    }
     print!("{}", if json { report.to_json() } else { report.to_text() });
     if let Some(inputs) = inputs {
         print!("\n{}", inputs.explain(&report, record.as_deref(), records.as_deref())?);

@@ -13,6 +13,7 @@ pub mod cubic;
 pub mod decision;
 pub mod decoys;
 mod error;
+pub mod evidence_map;
 pub mod explain;
 mod joined;
 mod landmarks;

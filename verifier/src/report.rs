@@ -5,6 +5,7 @@ use crate::{
     decision::{Decision, Verdict, p_any_message_log10},
     decoys::Decoys,
     error::ExitCode,
+    evidence_map::EvidenceMap,
     registration::Registration,
     verify::{Demodulator, Examination, Request},
 };
@@ -59,6 +60,9 @@ pub struct Report {
     /// CRS of the suspect's layers.
     #[serde(skip)]
     pub suspect_crs: Vec<String>,
+    /// Where the vertices were found, and what each patch says.
+    #[serde(skip)]
+    pub evidence_map: EvidenceMap,
 }
 
 /// How the message was decoded.
@@ -146,6 +150,7 @@ impl Report {
             seconds: seconds.clone(),
             reference_digest: seen.reference_digest.clone(),
             suspect_crs: seen.suspect_crs.clone(),
+            evidence_map: seen.evidence_map.scored(request, found),
         }
     }
 

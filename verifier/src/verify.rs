@@ -5,6 +5,7 @@ use crate::{
     crs_search::{self, Registered, side},
     decision::{Decision, decide},
     decoys::Decoys,
+    evidence_map::{EvidenceMap, Followed},
     joined::Graph,
     matching::{Matcher, Matches},
     progress::Progress,
@@ -95,6 +96,8 @@ pub struct Examination {
     pub found: std::result::Result<Demodulation, String>,
     /// How decoy keys score.
     pub decoys: Option<Decoys>,
+    /// Where the vertices were found.
+    pub evidence_map: EvidenceMap,
 }
 
 /// Verifies one suspect.
@@ -168,12 +171,14 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         suspect_crs,
         found: Err(unregistered(&vertices, chance, start)),
         decoys: None,
+        evidence_map: EvidenceMap::new(reference, ground, &patches),
     };
     if matches.count >= LEAST_MATCHED && matches.count >= TIMES_CHANCE * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
         let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
-        let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress);
-        let found = found.map_err(|error| of_reference(request, error))?;
+        let found = demodulate(request, &tracking, &matches, progress);
+        let (found, followed) = found.map_err(|error| of_reference(request, error))?;
+        seen.vertices.matched = seen.evidence_map.add_vertices(&followed);
         seen.decoys = Decoys::new(&found, &suspect.vertices, &reference.vertices);
         seen.found = Ok(found);
     }
@@ -214,22 +219,24 @@ fn demodulate(
     request: &Request,
     tracking: &Tracking,
     matches: &Matches,
-    vertices: &mut VertexCounts,
     progress: &mut Progress,
-) -> meshmark_core::Result<Demodulation> {
+) -> meshmark_core::Result<(Demodulation, Followed)> {
     let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
     let (carrier, steps) = (Carrier::new(&request.key), patches.as_slice().len() as u64);
     if request.demodulator == Demodulator::Paper {
         progress.start("demodulation", steps);
-        let matched = tracking.displacements(matches);
-        return demodulation::paper(patches, &carrier, &matched, bits, parameters, &progress.stepper());
+        let observed = tracking.displacements(matches);
+        let found = demodulation::paper(patches, &carrier, &observed, bits, parameters, &progress.stepper())?;
+        return Ok((found, Followed { weights: vec![1.0; observed.len()], observed }));
     }
     progress.start("deformation", 0);
     let carriers = patches.carriers(bits, parameters)?;
-    let (observed, disturbance) = tracking.follow(carriers, request)?;
-    vertices.matched = observed.iter().flatten().count();
+    let (observed, prediction) = tracking.follow(carriers, request)?;
+    let (shaped, disturbance) = prediction.shape_noise(patches, &observed, carriers, parameters.amplitude_m);
     progress.start("demodulation", steps);
-    demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &progress.stepper())
+    let step = progress.stepper();
+    let found = demodulation::joint(patches, &carrier, &shaped, bits, parameters, &disturbance, &step)?;
+    Ok((found, Followed { observed, weights: disturbance.weights }))
 }
 
 /// The record must be of this key, and its message what key and recipient give.
@@ -320,7 +327,7 @@ impl Tracking<'_> {
                     prediction = fit(&kept)?;
                     observed = kept;
                 }
-                return Ok(prediction.shape_noise(self.patches, &observed, carriers, amplitude_m));
+                return Ok((observed, prediction));
             }
             observed = self.displacements(&self.match_around(&prediction, request.radius_m));
             round += 1;

@@ -1,0 +1,152 @@
+"""Runs in QGIS itself, by --code: marks through the context menu, verifies, and takes the pictures of docs/qgis.md.
+
+Environment: MESHMARK_WORK, a folder with map.gpkg, key.json and records/; MESHMARK_PICTURES, where to."""
+
+import os
+import sys
+import time
+import traceback
+from collections import Counter
+
+import processing
+from osgeo import gdal
+from processing.gui.AlgorithmDialog import AlgorithmDialog
+from qgis.core import QgsApplication, QgsProject, QgsSettings
+from qgis.PyQt.QtCore import Qt, QTimer
+from qgis.PyQt.QtGui import QColor, QImage
+from qgis.PyQt.QtWidgets import QApplication, QDockWidget, QToolBar
+from qgis.utils import iface
+
+WORK, PICTURES = os.environ["MESHMARK_WORK"], os.environ["MESHMARK_PICTURES"]
+# For a dialog to open, and for a run to end, seconds.
+PATIENCE = 120
+
+
+def wait_for(condition, what):
+    until = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < until, f"waited in vain for {what}"
+        QgsApplication.processEvents()
+        time.sleep(0.02)
+
+
+def settle(seconds=1.0):
+    until = time.monotonic() + seconds
+    wait_for(lambda: time.monotonic() > until, "nothing")
+
+
+def picture(widget, name):
+    settle()
+    wait_for(lambda: not iface.mapCanvas().isDrawing(), "the map")
+    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    pixels = image.constBits()
+    pixels.setsize(image.sizeInBytes())
+    colours = [colour for colour, _ in Counter(memoryview(pixels).cast("B").cast("I")).most_common(256)]
+    few = image.convertToFormat(QImage.Format.Format_Indexed8, colours, Qt.ImageConversionFlag.AvoidDither)
+    assert few.save(os.path.join(PICTURES, name), "PNG", 0)
+
+
+def tidy_window():
+    window = iface.mainWindow()
+    window.resize(1180, 740)
+    for bar in window.findChildren(QToolBar):
+        bar.hide()
+    for dock in window.findChildren(QDockWidget):
+        dock.setVisible(dock.objectName() == "Layers")
+    iface.messageBar().clearWidgets()
+
+
+def context_menu_entry():
+    menu = iface.layerTreeView().menuProvider().createContextMenu()
+    entries = [action for action in menu.actions() if action.text() == "Export with watermark…"]
+    assert len(entries) == 1, [action.text() for action in menu.actions()]
+    return entries[0]
+
+
+def open_dialog():
+    return [w for w in QApplication.topLevelWidgets() if isinstance(w, AlgorithmDialog) and w.isVisible()]
+
+
+def export_by_context_menu():
+    layers = [iface.addVectorLayer(f"{WORK}/map.gpkg|layername={name}", name, "ogr") for name in ("buildings", "roads")]
+    iface.layerTreeView().setCurrentLayer(layers[0])
+    iface.layerTreeView().selectAll()
+    context_menu_entry().trigger()
+    wait_for(open_dialog, "the dialog")
+    dialog = open_dialog()[0]
+    parameters = dialog.createProcessingParameters()
+    assert set(parameters["LAYERS"]) == {layer.source() for layer in layers}, parameters
+    assert parameters["KEY"] == f"{WORK}/key.json", "the default is not that of the settings"
+    assert parameters["AMPLITUDE"] == 0.1 and parameters["SHAPE"] == "FREE", parameters
+    for_picture = {
+        "RECIPIENT": "ACME GmbH",
+        "KEY": "/maps/key.json",
+        "RECORDS": "/maps/records",
+        "OUTPUT": "/maps/acme.gpkg",
+    }
+    dialog.mainWidget().setParameters(for_picture)
+    dialog.resize(980, 700)
+    picture(dialog, "qgis-export.png")
+    real = {name: parameters[name] for name in ("KEY", "RECORDS")}
+    dialog.mainWidget().setParameters({**real, "OUTPUT": f"{WORK}/by_menu.gpkg"})
+    dialog.runAlgorithm()
+    wait_for(lambda: len(QgsProject.instance().mapLayers()) == 4, "the marked layers")
+    names = {layer.name() for layer in QgsProject.instance().mapLayers().values()}
+    assert {"buildings (marked)", "roads (marked)"} <= names, names
+    dialog.close()
+
+
+def leak(marked, suspect):
+    """The western half of a map."""
+    dataset = gdal.OpenEx(marked)
+    west, east, south, north = dataset.GetLayer(0).GetExtent()
+    half = [west, south, (west + east) / 2, north]
+    assert gdal.VectorTranslate(suspect, dataset, options=gdal.VectorTranslateOptions(format="GPKG", spatFilter=half))
+
+
+def verify():
+    QgsProject.instance().removeAllMapLayers()
+    leak(f"{WORK}/by_menu.gpkg", f"{WORK}/suspect.gpkg")
+    suspect = iface.addVectorLayer(f"{WORK}/suspect.gpkg|layername=buildings", "suspect", "ogr")
+    suspect.renderer().symbol().setColor(QColor("#d9d4c8"))
+    results = processing.runAndLoadResults(
+        "meshmark:verify",
+        {
+            "REFERENCE": f"{WORK}/records/by_menu.reference.gpkg",
+            "SUSPECT": f"{WORK}/suspect.gpkg",
+            "KEY": f"{WORK}/key.json",
+            "RECORDS": f"{WORK}/records",
+            "EVIDENCE_MAP": f"{WORK}/evidence.gpkg",
+            "REPORT": f"{WORK}/report.html",
+            "OPEN_REPORT": False,
+        },
+    )
+    assert results["VERDICT"] == "match" and results["RECIPIENT"] == "ACME GmbH", results
+    layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
+    vertices, patches = layers["Displacements"], layers["Patches"]
+    assert vertices.featureCount() == results["MATCHED_VERTICES"] > 100
+    for layer in (vertices, patches):
+        assert layer.renderer().type() == "RuleRenderer", layer.renderer().type()
+    order = [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()]
+    assert order.index("Displacements") < order.index("Patches"), f"patches hide the vertices: {order}"
+    QgsProject.instance().layerTreeRoot().findLayer(patches).setExpanded(True)
+    iface.mapCanvas().setExtent(patches.extent())
+    picture(iface.mainWindow(), "qgis-evidence.png")
+
+
+def main():
+    status = 1
+    try:
+        QgsSettings().setValue("meshmark/key_file", f"{WORK}/key.json")
+        QgsSettings().setValue("meshmark/record_folder", f"{WORK}/records")
+        tidy_window()
+        export_by_context_menu()
+        verify()
+        status = 0
+    except BaseException:
+        traceback.print_exc()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+QTimer.singleShot(1000, main)

@@ -1,0 +1,184 @@
+"""Runs the plugin's algorithms on layers that are no plain files, and cancels: qgis_plugin.sh verifies the copies."""
+
+import os
+import sys
+import threading
+
+sys.path[:0] = ["/usr/share/qgis/python/plugins", sys.argv[1]]
+
+import folder
+from meshmark.provider import MeshmarkProvider
+from processing.core.Processing import Processing
+from qgis.core import (
+    QgsApplication,
+    QgsFeature,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingFeedback,
+    QgsProcessingModelAlgorithm,
+    QgsProcessingModelChildAlgorithm,
+    QgsProcessingModelChildParameterSource,
+    QgsVectorLayer,
+)
+
+HERE = os.getcwd()
+
+
+def of_map(table, file="map.gpkg"):
+    layer = QgsVectorLayer(f"{HERE}/{file}|layername={table}", table, "ogr")
+    assert layer.isValid()
+    return layer
+
+
+def export(name, layers, feedback=None, **options):
+    import processing
+
+    return processing.run(
+        "meshmark:export",
+        {
+            "LAYERS": layers,
+            "RECIPIENT": "ACME GmbH",
+            "KEY": f"{HERE}/key.json",
+            "RECORDS": f"{HERE}/records",
+            "OUTPUT": f"{HERE}/{name}.gpkg",
+            **options,
+        },
+        feedback=feedback,
+    )
+
+
+def fails(why, name, layers, feedback=None, **options):
+    with folder.unchanged(f"qgis_plugin: {why}"):
+        try:
+            export(name, layers, feedback, **options)
+        except QgsProcessingException as error:
+            assert why in str(error), error
+        else:
+            raise AssertionError(f"no error that says {why}")
+
+
+class Cancelling(QgsProcessingFeedback):
+    """Cancels when the algorithm says something, or a little later."""
+
+    def __init__(self, text, seconds):
+        super().__init__(False)
+        self._text, self._seconds = text, seconds
+
+    def setProgressText(self, text):
+        if text == self._text:
+            threading.Timer(self._seconds, self.cancel).start()
+
+
+def memory_layer():
+    """A copy in memory with one edit that is not saved: a feature less."""
+    source = of_map("buildings")
+    layer = QgsVectorLayer(f"Polygon?crs={source.crs().authid()}", "in memory", "memory")
+    layer.dataProvider().addAttributes([f for f in source.fields() if f.name() != "fid"])
+    layer.updateFields()
+    copies = list(source.getFeatures())
+    for feature in copies:
+        feature.setAttributes(feature.attributes()[1:])
+    layer.dataProvider().addFeatures(copies)
+    layer.startEditing()
+    layer.deleteFeature(next(layer.getFeatures()).id())
+    return layer
+
+
+def layer_with_text_as_fid():
+    layer = QgsVectorLayer("Polygon?crs=EPSG:3067&field=fid:string", "text", "memory")
+    feature = QgsFeature(layer.fields())
+    feature.setAttributes(["first"])
+    layer.dataProvider().addFeatures([feature])
+    return layer
+
+
+def count(path):
+    layer = QgsVectorLayer(path, "", "ogr")
+    return layer.featureCount()
+
+
+def export_layers():
+    memory = memory_layer()
+    export("memory", [memory])
+    assert count(f"{HERE}/memory.gpkg") == memory.featureCount() == of_map("buildings").featureCount() - 1
+    filtered = of_map("buildings")
+    assert filtered.setSubsetString("fid % 10 <> 0")
+    export("filtered", [filtered])
+    assert 0 < count(f"{HERE}/filtered.gpkg") == filtered.featureCount() < of_map("buildings").featureCount()
+    export("degrees", [QgsVectorLayer(f"{HERE}/europe.gpkg", "first layer", "ogr")])
+    written = export("joined", [of_map("roads"), of_map("buildings"), of_map("roads")])
+    assert [path.partition("|layername=")[2] for path in written["MARKED_LAYERS"]] == ["roads", "buildings", "roads 2"]
+
+
+def verify_what_a_layer_shows():
+    import processing
+
+    suspect = of_map("buildings", "filtered.gpkg")
+    assert suspect.setSubsetString("fid % 2 = 0")
+    found = processing.run(
+        "meshmark:verify",
+        {
+            "REFERENCE": f"{HERE}/records/filtered.reference.gpkg",
+            "SUSPECT": suspect,
+            "KEY": f"{HERE}/key.json",
+            "RECORD": f"{HERE}/records/filtered.json",
+            "OPEN_REPORT": False,
+        },
+    )
+    assert found["VERDICT"] == "match" and found["RECIPIENT"] == "ACME GmbH", found
+    print("passed: qgis_plugin: the half of a map that a layer shows verifies", flush=True)
+
+
+def model():
+    """Export, then verify what was exported."""
+
+    def child(name, values):
+        algorithm = QgsProcessingModelChildAlgorithm(f"meshmark:{name}")
+        algorithm.setChildId(name)
+        for parameter, value in values.items():
+            algorithm.addParameterSources(parameter, [value])
+        return algorithm
+
+    value = QgsProcessingModelChildParameterSource.fromStaticValue
+    output = QgsProcessingModelChildParameterSource.fromChildOutput
+    places = {"KEY": value(f"{HERE}/key.json"), "RECORDS": value(f"{HERE}/records")}
+    subject = {"RECIPIENT": value("ACME GmbH"), "OUTPUT": value(f"{HERE}/model.gpkg")}
+    maps = {"REFERENCE": output("export", "REFERENCE"), "SUSPECT": output("export", "OUTPUT")}
+    made = QgsProcessingModelAlgorithm("mark and verify")
+    layers = value([f"{HERE}/map.gpkg|layername=buildings"])
+    made.addChildAlgorithm(child("export", {"LAYERS": layers, **subject, **places}))
+    made.addChildAlgorithm(child("verify", {**maps, "RECORD": output("export", "RECORD"), **places}))
+    return made
+
+
+def run_in_a_model():
+    context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
+    made = model()
+    made.initAlgorithm()
+    _, ok = made.run({}, context, feedback)
+    assert ok and "MATCH: " in feedback.textLog(), feedback.textLog()
+    print("passed: qgis_plugin: a model marks and verifies", flush=True)
+
+
+def fail_without_a_trace():
+    buildings = of_map("buildings")
+    copying, marking = Cancelling("Copying the layers", 0), Cancelling("Marking", 0.3)
+    fails("Cancelled: nothing was written", "cancelled", [buildings], copying)
+    fails("Cancelled: nothing was written", "cancelled", [buildings], marking)
+    fails("rename the field", "other", [layer_with_text_as_fid()])
+    fails("write a GPKG and convert it", "other", [buildings], OUTPUT=f"{HERE}/other.gml")
+    fails("Incorrect parameter value for AMPLITUDE", "wrong", [buildings], AMPLITUDE=1e9)
+    fails("exists: choose another file", "memory", [buildings])
+    fails("does not exist: make it", "none/other", [buildings])
+
+
+application = QgsApplication([], False)
+application.initQgis()
+Processing.initialize()
+provider = MeshmarkProvider()
+assert QgsApplication.processingRegistry().addProvider(provider)
+os.mkdir("records")
+export_layers()
+verify_what_a_layer_shows()
+run_in_a_model()
+fail_without_a_trace()

@@ -1,0 +1,121 @@
+"""What the three algorithms share."""
+
+import os
+
+from qgis.core import QgsProcessingAlgorithm, QgsProcessingException, QgsProcessingParameterDefinition
+from qgis.PyQt.QtGui import QIcon
+
+from . import layers
+from .commands import Cancelled
+from .driver import Missing
+from .text import tr
+
+# What ogr2ogr says after the driver said why.
+CONSEQUENCE = "MESHMARK driver failed to create "
+ICON = os.path.join(os.path.dirname(__file__), "icon.svg")
+
+
+class Algorithm(QgsProcessingAlgorithm):
+    """A subclass names its NAME, its `title`, its `about`, and what `needs` to be installed."""
+
+    NAME = ""
+
+    def title(self):
+        raise NotImplementedError
+
+    def about(self):
+        raise NotImplementedError
+
+    def needs(self):
+        """Raises Missing when something is not installed."""
+        raise NotImplementedError
+
+    def createInstance(self):
+        return type(self)()
+
+    def name(self):
+        return self.NAME
+
+    def displayName(self):
+        return self.title()
+
+    def icon(self):
+        return QIcon(ICON)
+
+    def svgIconPath(self):
+        return ICON
+
+    def tags(self):
+        return [tr("watermark"), tr("leak"), tr("recipient"), "MESHMARK"]
+
+    def shortHelpString(self):
+        hidden = QgsProcessingParameterDefinition.Flag.FlagHidden
+        shown = [p for p in self.parameterDefinitions() if p.help() and not p.flags() & hidden]
+        items = "".join(f"<h3>{p.description()}</h3><p>{p.help()}</p>" for p in shown)
+        return f"<p>{self.about()}</p>{items}"
+
+    def add(self, parameter, help_text):
+        """Adds a parameter with its help, which the dialog shows beside it and as a tooltip."""
+        parameter.setHelp(help_text)
+        # The framework owns it from here on.
+        self.addParameter(parameter)
+
+    def canExecute(self):
+        try:
+            self.needs()
+        except Missing as missing:
+            return False, str(missing)
+        return True, ""
+
+    def prepareAlgorithm(self, parameters, context, feedback):
+        try:
+            self.needs()
+        except Missing as missing:
+            raise QgsProcessingException(str(missing)) from missing
+        return self.prepare(parameters, context, feedback)
+
+    def processAlgorithm(self, parameters, context, feedback):
+        # QGIS shows a traceback of any exception but its own, subclasses included.
+        try:
+            return self.process(parameters, context, feedback)
+        except (Cancelled, Missing) as reason:
+            raise QgsProcessingException(str(reason)) from reason
+
+    def prepare(self, parameters, context, feedback):
+        """In the main thread, before the run: what has to do with layers of the project."""
+        raise NotImplementedError
+
+    def process(self, parameters, context, feedback):
+        """The run, in a thread of its own."""
+        raise NotImplementedError
+
+    def map_layer(self, parameters, name, context):
+        """The file of a layer, or what it shows as a Snapshot."""
+        layer = self.parameterAsVectorLayer(parameters, name, context)
+        if layer is None:
+            raise QgsProcessingException(self.invalidSourceError(parameters, name))
+        return layers.file_of(layer) or layers.Snapshot(layer)
+
+
+def file_of_map(given, folder, name, context, feedback):
+    """The path of what `map_layer` gave; a Snapshot is copied into `folder` first."""
+    if isinstance(given, str):
+        return given
+    path = os.path.join(folder, f"{name}.gpkg")
+    layers.copy([given], path, context, feedback)
+    return path
+
+
+def sentences(errors):
+    """What programs of GDAL and meshmark printed as errors and as warnings, without their prefixes."""
+    found, warned, other = [], [], []
+    for line in filter(None, map(str.strip, errors.splitlines())):
+        kind, _, rest = line.partition(": ")
+        if kind.startswith("Warning "):
+            warned.append(rest)
+        elif (kind.startswith("ERROR ") and not rest.startswith(CONSEQUENCE)) or kind == "meshmark":
+            found.append(rest)
+        else:
+            other.append(line)
+    # The rest only says that it failed, when it is said why.
+    return found or other, warned

@@ -1,0 +1,122 @@
+"""The programs the plugin runs: `meshmark` and GDAL's `ogr2ogr`. A run can be cancelled."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from collections import namedtuple
+
+from qgis.core import QgsApplication
+
+from . import driver, settings
+from .driver import Missing
+from .text import tr
+
+Finished = namedtuple("Finished", "code output errors")
+
+# How often a running program is looked after, seconds.
+PATIENCE = 0.1
+# How long it may take to end once it was asked to, seconds.
+GRACE = 5
+
+
+class Cancelled(Exception):
+    """The user cancelled, and the program was stopped."""
+
+    def __init__(self):
+        super().__init__(tr("Cancelled: nothing was written."))
+
+
+def meshmark():
+    """The path of the command meshmark."""
+    path = settings.get(settings.COMMAND)
+    if path and not shutil.which(path):
+        raise Missing(
+            tr(
+                "{} is not a program that can be run: correct the path of the command meshmark in Settings >"
+                " Options > meshmark."
+            ).format(path)
+        )
+    found = path or shutil.which("meshmark")
+    if not found:
+        raise Missing(
+            tr(
+                "The command meshmark is not installed: install meshmark (package meshmark, or `make install` in"
+                " its sources), or name its path in Settings > Options > meshmark."
+            )
+        )
+    return found
+
+
+def ogr2ogr():
+    """The path of GDAL's ogr2ogr, that of this QGIS first."""
+    beside = os.path.join(QgsApplication.prefixPath(), "bin", "ogr2ogr")
+    found = shutil.which(beside) or shutil.which("ogr2ogr")
+    if not found:
+        raise Missing(tr("GDAL's command ogr2ogr is not installed: install it (package gdal-bin)."))
+    return found
+
+
+def has_option(subcommand, option):
+    """Whether `meshmark SUBCOMMAND` of the installed version has an option."""
+    asked = subprocess.run([meshmark(), subcommand, "--help"], capture_output=True, **_without_window())
+    return re.search(rb"^\s+%s\b" % re.escape(option.encode()), asked.stdout, re.MULTILINE) is not None
+
+
+def run(arguments, feedback, on_output=lambda text: None):
+    """Runs a program to its end; `on_output` is told what it prints. Raises Cancelled when the user cancels."""
+    process = subprocess.Popen(
+        arguments,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=driver.environment(),
+        **_without_window(),
+    )
+    output, errors = bytearray(), bytearray()
+    readers = [
+        threading.Thread(target=_drain, args=pair, daemon=True)
+        for pair in [(process.stdout, output), (process.stderr, errors)]
+    ]
+    for reader in readers:
+        reader.start()
+    with process:
+        while _is_running(process):
+            on_output(output.decode(errors="replace"))
+            if feedback.isCanceled():
+                _stop(process)
+                raise Cancelled()
+        for reader in readers:
+            reader.join()
+    return Finished(process.returncode, output.decode(errors="replace"), errors.decode(errors="replace"))
+
+
+def _is_running(process):
+    try:
+        process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        return True
+    return False
+
+
+def _drain(stream, into):
+    while True:
+        read = os.read(stream.fileno(), 1 << 16)
+        if not read:
+            return
+        into.extend(read)
+
+
+def _stop(process):
+    process.terminate()
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _without_window():
+    return {"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {}

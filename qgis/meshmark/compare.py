@@ -1,0 +1,104 @@
+"""Compare original and marked map: the figures of `meshmark compare`."""
+
+import tempfile
+
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingOutputNumber,
+    QgsProcessingParameterNumber,
+    QgsProcessingParameterString,
+    QgsProcessingParameterVectorLayer,
+)
+
+from . import commands, reports
+from .algorithm import Algorithm, file_of_map
+from .text import tr
+from .verify import answer
+
+
+class Compare(Algorithm):
+    NAME = "compare"
+
+    def title(self):
+        return tr("Compare original and marked map")
+
+    def about(self):
+        return tr(
+            "Says what marking did to a map: how far vertices moved, how angles and areas changed, and whether"
+            " anything became invalid, overlaps or crosses that did not before. Features correspond by their order"
+            " in each layer, vertices by their order in each feature."
+        )
+
+    def needs(self):
+        commands.meshmark()
+
+    def initAlgorithm(self, configuration=None):
+        vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
+        self.add(
+            QgsProcessingParameterVectorLayer("ORIGINAL", tr("Original map"), [vector]),
+            tr(
+                "The map before it was marked: the .reference.gpkg of the export, or its source. All layers of the"
+                " file are used."
+            ),
+        )
+        self.add(
+            QgsProcessingParameterVectorLayer("MARKED", tr("Marked map"), [vector]),
+            tr("The map as it was exported. All layers of the file are used."),
+        )
+        self.add(
+            QgsProcessingParameterString("LAYERS", tr("Layers to compare"), optional=True),
+            tr("Names of layers, separated by commas; all when empty."),
+        )
+        kind = QgsProcessingParameterNumber.Type.Double
+        self.add(
+            QgsProcessingParameterNumber("PRECISION", tr("Precision, CRS units"), kind, None, True, 0),
+            tr("Grid of the marked map: overlaps up to a cell of it count as slivers."),
+        )
+        reports.add_parameters(self)
+        for name, label, _ in figures():
+            self.addOutput(QgsProcessingOutputNumber(name, label))
+
+    def prepare(self, given, context, feedback):
+        self._original = self.map_layer(given, "ORIGINAL", context)
+        self._marked = self.map_layer(given, "MARKED", context)
+        return True
+
+    def process(self, given, context, feedback):
+        self._report = reports.Report(self, given, context, feedback)
+        with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
+            arguments = [commands.meshmark(), "compare", "--json", *self._report.options()]
+            names = self.parameterAsString(given, "LAYERS", context)
+            arguments += ["--layers", names] if names else []
+            if given.get("PRECISION") is not None:
+                arguments += ["--precision", repr(self.parameterAsDouble(given, "PRECISION", context))]
+            arguments += ["--", file_of_map(self._original, staging, "original", context, feedback)]
+            arguments += [file_of_map(self._marked, staging, "marked", context, feedback)]
+            feedback.setProgressText(tr("Comparing"))
+            found = answer(commands.run(arguments, feedback), (0,), feedback)
+        results = {name: found[section][figure] for name, _, (section, figure) in figures()}
+        for name, label, _ in figures():
+            feedback.pushInfo(f"{label}: {results[name]:.6g}")
+        return {**results, "REPORT": self._report.path} if self._report.path else results
+
+    def postProcessAlgorithm(self, context, feedback):
+        self._report.open()
+        return {}
+
+
+def figures():
+    """Name, label, and where the command's JSON has the figure."""
+    return [
+        ("FEATURES", tr("Features compared"), ("compared", "features")),
+        ("VERTICES", tr("Vertices compared"), ("compared", "vertices")),
+        ("DISPLACEMENT_RMS_M", tr("Displacement of vertices, root mean square, metres"), ("displacement", "rms_m")),
+        ("DISPLACEMENT_P99_M", tr("Displacement, 99th percentile, metres"), ("displacement", "p99_m")),
+        ("DISPLACEMENT_MAX_M", tr("Displacement, largest, metres"), ("displacement", "max_m")),
+        ("ANGLE_MEAN_CHANGE_DEG", tr("Change of angles, mean, degrees"), ("angles", "mean_change_deg")),
+        ("RIGHT_ANGLES_KEPT", tr("Share of right angles kept within 1 degree"), ("angles", "right_angles_kept")),
+        ("AREA_MEAN_CHANGE", tr("Change of areas, mean share"), ("areas", "mean_change")),
+        ("AREA_MAX_CHANGE", tr("Change of areas, largest share"), ("areas", "max_change")),
+        ("NEWLY_INVALID", tr("Geometries that became invalid"), ("validity", "newly_invalid")),
+        ("NEW_OVERLAPS", tr("New overlaps of polygons"), ("overlaps", "new")),
+        ("NEW_CROSSINGS", tr("New crossings of lines"), ("crossings", "new")),
+        ("TORN_VERTICES", tr("Shared vertices that were torn apart"), ("compared", "torn_vertices")),
+    ]

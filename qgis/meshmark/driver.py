@@ -1,0 +1,99 @@
+"""The GDAL driver MESHMARK: where it is, which options it has, and how an export that was killed is cleared away."""
+
+import contextlib
+import os
+from collections import namedtuple
+from xml.etree import ElementTree
+
+from osgeo import gdal
+
+from . import settings
+from .text import tr
+
+# An option of the driver's own list; numbers and choices are texts, as the list has them.
+Option = namedtuple("Option", "name type default least most choices help")
+
+
+class Missing(Exception):
+    """A program or driver is not there; the message says how to install it."""
+
+
+def find():
+    """The driver, loaded from the folder of the settings when GDAL does not have it yet."""
+    driver = gdal.GetDriverByName("MESHMARK")
+    folder = settings.get(settings.DRIVER_FOLDER)
+    reason = ""
+    if driver is None and folder:
+        gdal.ErrorReset()
+        with _search_path(folder), _quiet():
+            gdal.AllRegister()
+        reason = gdal.GetLastErrorMsg()
+        driver = gdal.GetDriverByName("MESHMARK")
+    if driver is not None:
+        return driver
+    version = gdal.VersionInfo("RELEASE_NAME")
+    searched = tr("it is not in {} either ({})").format(folder, reason or tr("no ogr_MESHMARK there")) if folder else ""
+    raise Missing(
+        tr(
+            "The GDAL driver MESHMARK is not installed for the GDAL {} of this QGIS{}: install meshmark built for"
+            " this GDAL (package meshmark, or `make install` in its sources), or name the folder of ogr_MESHMARK.so"
+            " in Settings > Options > meshmark."
+        ).format(version, f", {searched}" if searched else "")
+    )
+
+
+def options():
+    """The creation options of the driver, as it lists them."""
+    listed = ElementTree.fromstring(find().GetMetadataItem(gdal.DMD_CREATIONOPTIONLIST))
+    return [
+        Option(
+            entry.get("name"),
+            entry.get("type"),
+            entry.get("default"),
+            entry.get("min"),
+            entry.get("max"),
+            [value.text for value in entry.findall("Value")],
+            entry.get("description"),
+        )
+        for entry in listed.findall("Option")
+    ]
+
+
+def environment():
+    """The environment of a child process that shall find the driver."""
+    variables = dict(os.environ)
+    folder = settings.get(settings.DRIVER_FOLDER)
+    if folder:
+        variables["GDAL_DRIVER_PATH"] = folder
+    return variables
+
+
+def clear_away(target, creation_options):
+    """Removes what a killed export to `target` left. Whoever next writes to a place clears it: begin, and give up."""
+    with _quiet():
+        dataset = find().Create(f"MESHMARK:{target}", 0, 0, 0, gdal.GDT_Unknown, creation_options)
+        del dataset
+
+
+@contextlib.contextmanager
+def _search_path(folder):
+    before = gdal.GetConfigOption("GDAL_DRIVER_PATH")
+    gdal.SetConfigOption("GDAL_DRIVER_PATH", folder)
+    try:
+        yield
+    finally:
+        gdal.SetConfigOption("GDAL_DRIVER_PATH", before)
+
+
+@contextlib.contextmanager
+def _quiet():
+    """GDAL prints nothing and raises nothing."""
+    raises = gdal.GetUseExceptions()
+    gdal.DontUseExceptions()
+    gdal.PushErrorHandler("CPLQuietErrorHandler")
+    try:
+        yield
+    finally:
+        gdal.PopErrorHandler()
+        if raises:
+            gdal.UseExceptions()

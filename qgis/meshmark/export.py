@@ -1,0 +1,201 @@
+"""Export with watermark: layers in, a marked file, its record and its reference out."""
+
+import os
+import re
+import tempfile
+
+from osgeo import gdal
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingOutputFile,
+    QgsProcessingOutputMultipleLayers,
+    QgsProcessingParameterBoolean,
+    QgsProcessingParameterFile,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterMultipleLayers,
+)
+
+from . import commands, driver, layers, parameters, settings
+from .algorithm import Algorithm, sentences
+from .driver import Missing
+from .text import tr
+
+# Options of the driver that the algorithm sets itself: paths, and what follows from the layers and the file name.
+OWN = {"KEY", "RECORD", "REFERENCE", "LAYERS", "FORMAT"}
+# What most exports need; all others are advanced.
+COMMON = {"RECIPIENT", "MESSAGE", "AMPLITUDE", "TOLERANCE", "SHAPE"}
+
+
+class Export(Algorithm):
+    NAME = "export"
+
+    def title(self):
+        return tr("Export with watermark")
+
+    def about(self):
+        return tr(
+            "Writes a copy of one or more layers that carries an invisible message in centimetre shifts of its"
+            " vertices. All layers form one mesh and are marked together. The file appears when it is complete, was"
+            " read back and carries the message, or not at all. Beside it a record and a reference (the unmarked"
+            " map) are written to the record folder: keep both and the key, verification needs all three, and never"
+            " hand them out."
+        )
+
+    def needs(self):
+        driver.find()
+        commands.ogr2ogr()
+
+    def initAlgorithm(self, configuration=None):
+        vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
+        self.add(
+            QgsProcessingParameterMultipleLayers("LAYERS", tr("Layers to export"), vector),
+            tr("What they show is exported, with their filters and unsaved edits. Several layers need a GeoPackage."),
+        )
+        self._options = self._driver_options()
+        for option in self._options:
+            if option.name in COMMON:
+                self.addParameter(parameters.parameter(option))
+        self.add(
+            QgsProcessingParameterFile("KEY", tr("Key file"), defaultValue=settings.get(settings.KEY_FILE) or None),
+            tr("The secret key, made once by `meshmark keygen key.json`. Only its path is handed on."),
+        )
+        records = QgsProcessingParameterFile.Behavior.Folder
+        self.add(
+            QgsProcessingParameterFile(
+                "RECORDS", tr("Record folder"), records, defaultValue=settings.get(settings.RECORD_FOLDER) or None
+            ),
+            tr("Where the record (.json) and the reference (.reference.gpkg) of this copy are kept for an auditor."),
+        )
+        self.add(
+            QgsProcessingParameterFileDestination("OUTPUT", tr("Marked map"), file_filter()),
+            tr("The file to hand out. Its extension chooses the format; only GeoPackage holds several layers."),
+        )
+        self.add(
+            QgsProcessingParameterBoolean("ADD_TO_PROJECT", tr("Add the marked map to the project"), True),
+            tr("Shows the result when it is written."),
+        )
+        for option in self._options:
+            if option.name not in COMMON:
+                self.addParameter(parameters.advanced(parameters.parameter(option)))
+        self.addOutput(QgsProcessingOutputMultipleLayers("MARKED_LAYERS", tr("Marked layers")))
+        self.addOutput(QgsProcessingOutputFile("RECORD", tr("Record")))
+        self.addOutput(QgsProcessingOutputFile("REFERENCE", tr("Reference")))
+
+    @staticmethod
+    def _driver_options():
+        """None without the driver: then the algorithm only says that it is missing."""
+        try:
+            return [option for option in driver.options() if option.name not in OWN]
+        except Missing:
+            return []
+
+    def checkParameterValues(self, given, context):
+        ok, message = super().checkParameterValues(given, context)
+        subjects = [self.parameterAsString(given, name, context) for name in ("RECIPIENT", "MESSAGE")]
+        if ok and self._options and subjects.count("") != 1:
+            return False, tr("Give a recipient, or a message instead of it, but not both.")
+        return ok, message
+
+    def prepare(self, given, context, feedback):
+        chosen = self.parameterAsLayerList(given, "LAYERS", context)
+        if not chosen:
+            raise QgsProcessingException(tr("No layer is given that can be opened: choose the layers to export."))
+        self._snapshots = [layers.Snapshot(layer) for layer in chosen]
+        return True
+
+    def process(self, given, context, feedback):
+        output = self.parameterAsFileOutput(given, "OUTPUT", context)
+        values = {o.name: parameters.value(self, o, given, context) for o in self._options}
+        folder = self.parameterAsString(given, "RECORDS", context)
+        check_places(output, folder, values.get("OVERWRITE") == "YES")
+        record, reference = free_names(folder, os.path.splitext(os.path.basename(output))[0])
+        values.update(KEY=self.parameterAsString(given, "KEY", context), RECORD=record, REFERENCE=reference)
+        options = [f"{name}={value}" for name, value in values.items() if value]
+
+        # What is staged is unmarked: the folder is the user's alone, and goes with the run.
+        with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
+            source = os.path.join(staging, "source.gpkg")
+            feedback.setProgressText(tr("Copying the layers"))
+            names = layers.copy(self._snapshots, source, context, feedback)
+            export(source, output, options, feedback)
+        feedback.pushInfo(tr("Record: {}").format(record))
+        feedback.pushInfo(tr("Reference: {}").format(reference))
+        marked = layers_of(output)
+        if self.parameterAsBool(given, "ADD_TO_PROJECT", context) and context.project():
+            for name, source in zip(names, marked):
+                details = QgsProcessingContext.LayerDetails(
+                    tr("{} (marked)").format(name), context.project(), "MARKED_LAYERS"
+                )
+                context.addLayerToLoadOnCompletion(source, details)
+        return {"OUTPUT": output, "MARKED_LAYERS": marked, "RECORD": record, "REFERENCE": reference}
+
+
+def export(source, output, options, feedback):
+    """Marks a file by a child process, which can be stopped, and makes sure that the marked file is there."""
+    feedback.setProgressText(tr("Marking"))
+    arguments = [commands.ogr2ogr(), "-progress", "-f", "MESHMARK", f"MESHMARK:{output}", source]
+    for option in options:
+        arguments += ["-dsco", option]
+    try:
+        finished = commands.run(arguments, feedback, lambda text: feedback.setProgress(percent(text)))
+    except commands.Cancelled:
+        driver.clear_away(output, options)
+        raise
+    errors, warnings = sentences(finished.errors)
+    for warning in warnings:
+        feedback.pushWarning(warning)
+    if finished.code != 0 or not os.path.exists(output):
+        ended = tr("ogr2ogr ended with exit code {}.").format(finished.code)
+        raise QgsProcessingException("\n".join(errors or [ended]))
+
+
+def percent(text):
+    """How far ogr2ogr says it is: "0...10...20"."""
+    numbers = re.findall(r"\d+", text)
+    return float(numbers[-1]) if numbers else 0.0
+
+
+def check_places(output, folder, overwrite):
+    """Says what is wrong with the places of the outputs before anything is copied."""
+    if not os.path.isdir(folder):
+        raise QgsProcessingException(
+            tr("The record folder {} does not exist: make it, or choose another.").format(folder or '""')
+        )
+    if not os.path.isdir(os.path.dirname(os.path.abspath(output))):
+        raise QgsProcessingException(tr("The folder of {} does not exist: make it, or choose another.").format(output))
+    if os.path.lexists(output) and not overwrite:
+        raise QgsProcessingException(
+            tr("{} exists: choose another file, or let it be replaced (OVERWRITE).").format(output)
+        )
+
+
+def free_names(folder, stem):
+    """Names of a record and a reference that do not exist: those of an earlier copy are never replaced."""
+    number = 1
+    while True:
+        base = os.path.join(folder, stem if number == 1 else f"{stem}-{number}")
+        record, reference = f"{base}.json", f"{base}.reference.gpkg"
+        if not os.path.lexists(record) and not os.path.lexists(reference):
+            return record, reference
+        number += 1
+
+
+def layers_of(path):
+    """What QGIS opens the layers of a file by."""
+    dataset = gdal.OpenEx(path, gdal.OF_VECTOR)
+    names = [dataset.GetLayer(i).GetName() for i in range(dataset.GetLayerCount())]
+    return [path] if len(names) == 1 else [f"{path}|layername={name}" for name in names]
+
+
+def file_filter():
+    return ";;".join(
+        [
+            tr("GeoPackage (*.gpkg)"),
+            tr("Shapefile (*.shp)"),
+            tr("FlatGeobuf (*.fgb)"),
+            tr("GeoJSON (*.geojson)"),
+            tr("GeoJSON, newline delimited (*.geojsonl)"),
+        ]
+    )

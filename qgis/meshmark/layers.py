@@ -1,0 +1,99 @@
+"""Layers of QGIS as files: what a layer shows, copied to a GeoPackage, or the file it comes from."""
+
+import os
+
+from qgis.core import (
+    QgsFeatureRequest,
+    QgsFeatureSink,
+    QgsProcessingException,
+    QgsProviderRegistry,
+    QgsVectorFileWriter,
+    QgsVectorLayerFeatureSource,
+)
+
+from .commands import Cancelled
+from .text import tr
+
+WRITERS = QgsVectorFileWriter
+
+
+class Snapshot:
+    """What a layer shows now, with its filter and unsaved edits: made by the main thread, read by any."""
+
+    def __init__(self, layer):
+        self.name = own_name(layer)
+        self.fields = layer.fields()
+        self.type = layer.wkbType()
+        self.crs = layer.crs()
+        self.count = max(layer.featureCount(), 0)
+        self._source = QgsVectorLayerFeatureSource(layer)
+
+    def features(self):
+        return self._source.getFeatures(QgsFeatureRequest())
+
+
+def own_name(layer):
+    """What a layer is called; that of its table where QGIS only named it after the file."""
+    source = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
+    table, file = source.get("layerName"), os.path.basename(source.get("path") or "")
+    generated = [os.path.splitext(file)[0], f"{os.path.splitext(file)[0]} — {table}"]
+    return table if table and layer.name() in generated else layer.name()
+
+
+def file_of(layer):
+    """The file a layer shows as it is; None when the layer filters it, has unsaved edits or is no local file."""
+    if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
+        return None
+    path = QgsProviderRegistry.instance().decodeUri("ogr", layer.source()).get("path", "")
+    return path if os.path.exists(path) else None
+
+
+def copy(snapshots, path, context, feedback):
+    """Writes snapshots as layers of a new GeoPackage and gives their names there, every one only once."""
+    total = sum(snapshot.count for snapshot in snapshots)
+    done, names = 0, []
+    for snapshot in snapshots:
+        name, number = snapshot.name or "layer", 2
+        while name.lower() in (other.lower() for other in names):
+            name, number = f"{snapshot.name} {number}", number + 1
+        names.append(name)
+        done = _copy_one(snapshot, name, path, context, _Progress(feedback, done, total))
+    return names
+
+
+def _copy_one(snapshot, name, path, context, progress):
+    options = WRITERS.SaveVectorOptions()
+    options.driverName = "GPKG"
+    options.layerName = name
+    if os.path.exists(path):
+        options.actionOnExistingFile = WRITERS.ActionOnExistingFile.CreateOrOverwriteLayer
+    transforms = context.transformContext()
+    writer = WRITERS.create(path, snapshot.fields, snapshot.type, snapshot.crs, transforms, options)
+    _check(writer, name)
+    for feature in snapshot.features():
+        if not writer.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
+            _check(writer, name)
+        progress.step()
+    if not writer.flushBuffer():
+        _check(writer, name)
+    del writer
+    return progress.done
+
+
+def _check(writer, name):
+    if writer.hasError() != WRITERS.WriterError.NoError:
+        reason = writer.errorMessage()
+        if "fid" in reason:
+            reason += tr(" - a field fid must hold whole numbers, every one once: rename the field")
+        raise QgsProcessingException(tr("The layer {} cannot be copied: {}").format(name, reason))
+
+
+class _Progress:
+    def __init__(self, feedback, done, total):
+        self.feedback, self.done, self.total = feedback, done, max(total, 1)
+
+    def step(self):
+        if self.feedback.isCanceled():
+            raise Cancelled()
+        self.done += 1
+        self.feedback.setProgress(100 * self.done / self.total)

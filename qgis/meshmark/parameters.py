@@ -1,0 +1,78 @@
+"""The driver's options as parameters of an algorithm: types, bounds, defaults and help are those of its list."""
+
+from qgis.core import (
+    QgsProcessingParameterBoolean,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterNumber,
+    QgsProcessingParameterString,
+)
+
+from .text import tr
+
+NUMBER = QgsProcessingParameterNumber.Type
+SWITCH = ["NO", "YES"]
+# Of numbers that may be in degrees; those with a default are metres.
+DECIMALS = 9
+
+
+def labels():
+    """What options are called in the dialog; one that a later driver has is called as the driver calls it."""
+    return {
+        "RECIPIENT": tr("Recipient"),
+        "MESSAGE": tr("Message in hexadecimal digits, instead of a recipient"),
+        "AMPLITUDE": tr("Amplitude, metres"),
+        "TOLERANCE": tr("Tolerance, metres"),
+        "PRECISION": tr("Precision, CRS units"),
+        "SHAPE": tr("Shape"),
+        "BASIS": tr("Basis"),
+        "CODE": tr("Code"),
+        "CHIP_RATE": tr("Chip rate"),
+        "PATCH_SIZE": tr("Patch size, vertices"),
+        "SRS": tr("CRS of layers that have none"),
+        "OVERWRITE": tr("Replace the file when it exists"),
+    }
+
+
+def parameter(option):
+    """The parameter for an option of the driver."""
+    label = labels().get(option.name, option.name)
+    optional = option.default is None
+    if option.choices == SWITCH:
+        made = QgsProcessingParameterBoolean(option.name, label, option.default == "YES")
+    elif option.choices:
+        made = QgsProcessingParameterEnum(
+            option.name, label, option.choices, False, option.default, optional, usesStaticStrings=True
+        )
+    elif option.type in ("float", "int"):
+        convert, kind = (float, NUMBER.Double) if option.type == "float" else (int, NUMBER.Integer)
+        default = None if optional else convert(option.default)
+        bounds = [convert(bound) for bound in (option.least, option.most) if bound is not None]
+        made = QgsProcessingParameterNumber(option.name, label, kind, default, optional, *bounds)
+        made.setMetadata({"widget_wrapper": {"decimals": 3 if option.default else DECIMALS}})
+    else:
+        made = QgsProcessingParameterString(option.name, label, option.default, False, optional)
+    made.setHelp(option.help)
+    return made
+
+
+def advanced(made):
+    made.setFlags(made.flags() | QgsProcessingParameterDefinition.Flag.FlagAdvanced)
+    return made
+
+
+def value(algorithm, option, parameters, context):
+    """The text of an option, None where it is not given."""
+    definition = algorithm.parameterDefinition(option.name)
+    given = parameters.get(option.name)
+    if given in (None, "") and definition.defaultValue() is None:
+        return None
+    if option.choices == SWITCH:
+        return SWITCH[algorithm.parameterAsBool(parameters, option.name, context)]
+    if option.choices:
+        return algorithm.parameterAsEnumString(parameters, option.name, context)
+    if option.type == "int":
+        return str(algorithm.parameterAsInt(parameters, option.name, context))
+    if option.type == "float":
+        return repr(algorithm.parameterAsDouble(parameters, option.name, context))
+    return algorithm.parameterAsString(parameters, option.name, context)

@@ -1,0 +1,44 @@
+"""The report that the command writes, for the algorithms that run it: its parameters, and how it is opened."""
+
+import os
+
+from qgis.core import QgsProcessingParameterBoolean, QgsProcessingParameterFileDestination
+from qgis.PyQt.QtCore import QUrl
+from qgis.PyQt.QtGui import QDesktopServices
+
+from . import commands
+from .text import tr
+
+
+def add_parameters(algorithm):
+    algorithm.add(
+        QgsProcessingParameterFileDestination(
+            "REPORT", tr("Report"), tr("HTML files (*.html)"), optional=True, createByDefault=True
+        ),
+        tr("A report to read, print and hand on; it holds no secret."),
+    )
+    algorithm.add(
+        QgsProcessingParameterBoolean("OPEN_REPORT", tr("Open the report"), True),
+        tr("Shows the report in the web browser when it is written."),
+    )
+
+
+class Report:
+    """The report of one run; `path` is empty when none is written."""
+
+    def __init__(self, algorithm, given, context, feedback):
+        self.path = algorithm.parameterAsFileOutput(given, "REPORT", context)
+        self._is_opened = algorithm.parameterAsBool(given, "OPEN_REPORT", context)
+        if self.path and not commands.has_option(algorithm.NAME, "--report"):
+            feedback.pushWarning(tr("This version of the command meshmark writes no report: install a later one."))
+            self.path = ""
+
+    def options(self):
+        return ["--report", self.path] if self.path else []
+
+    def open(self):
+        """By the main thread; only where somebody looks at QGIS."""
+        from qgis.utils import iface
+
+        if iface is not None and self._is_opened and os.path.exists(self.path):
+            QDesktopServices.openUrl(QUrl.fromLocalFile(self.path))

@@ -1,0 +1,107 @@
+"""How the layers of the evidence look: colours that colour-blind people tell apart (Okabe and Ito 2008)."""
+
+from qgis.core import (
+    QgsArrowSymbolLayer,
+    QgsFillSymbol,
+    QgsGeometryGeneratorSymbolLayer,
+    QgsLineSymbol,
+    QgsProcessingLayerPostProcessorInterface,
+    QgsRuleBasedRenderer,
+    QgsVectorLayerUtils,
+)
+from qgis.PyQt.QtGui import QColor
+
+from .text import tr
+
+# The average arrow on the screen, metres.
+ARROW_M = 0.003
+
+
+def displacements(layer):
+    """Arrows, exaggerated to a readable length at any scale; the weight is how well one fits in with the others."""
+    values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
+    rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
+    exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
+    return rules(
+        [
+            (tr("fits in with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
+            (
+                tr("fits in less well"),
+                '"weight" >= 0.5 AND "weight" < 0.9',
+                arrow("#e69f00", exaggeration),
+            ),
+            (tr("does not fit in"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
+        ]
+    )
+
+
+def patches(_layer):
+    """The score is standard normal under a wrong key: beyond 4 once in 30 000 patches."""
+    return rules(
+        [
+            (tr("mark shows clearly (6 and more)"), '"score" >= 6', area("#0072b2", 110)),
+            (tr("mark shows (3 to 6)"), '"score" >= 3 AND "score" < 6', area("#56b4e9", 90)),
+            (tr("too little to say (below 3)"), '"score" < 3', area("#f0e442", 60)),
+            (tr("not found, or not tested"), '"score" IS NULL', area("#999999", 30)),
+        ]
+    )
+
+
+def rules(entries):
+    root = QgsRuleBasedRenderer.Rule(None)
+    for label, expression, symbol in entries:
+        root.appendChild(QgsRuleBasedRenderer.Rule(symbol, 0, 0, expression, label))
+    return QgsRuleBasedRenderer(root)
+
+
+def arrow(colour, exaggeration):
+    shaft = QgsArrowSymbolLayer.create(
+        {
+            "is_curved": "0",
+            "arrow_width": "0.25",
+            "arrow_start_width": "0.25",
+            "head_length": "0.9",
+            "head_thickness": "0.5",
+        }
+    )
+    shaft.setSubSymbol(QgsFillSymbol.createSimple({"color": colour, "outline_style": "no"}))
+    line = QgsLineSymbol()
+    line.changeSymbolLayer(0, shaft)
+    end = " + ".join(
+        ["{0}(start_point($geometry))", "({1}) * ({0}(end_point($geometry)) - {0}(start_point($geometry)))"]
+    )
+    ends = ", ".join(end.format(axis, exaggeration) for axis in "xy")
+    longer = QgsGeometryGeneratorSymbolLayer.create(
+        {"geometryModifier": f"make_line(start_point($geometry), make_point({ends}))", "SymbolType": "Line"}
+    )
+    longer.setSubSymbol(line)
+    symbol = QgsLineSymbol()
+    symbol.changeSymbolLayer(0, longer)
+    return symbol
+
+
+def area(colour, opacity):
+    red, green, blue, _ = QColor(colour).getRgb()
+    style = {"color": f"{red},{green},{blue},{opacity}", "outline_color": "90,90,90,180", "outline_width": "0.3"}
+    return QgsFillSymbol.createSimple(style)
+
+
+class Styler(QgsProcessingLayerPostProcessorInterface):
+    """Gives a layer its look when it is added to the project."""
+
+    def __init__(self, renderer_of):
+        super().__init__()
+        self._renderer_of = renderer_of
+
+    def postProcessLayer(self, layer, context, feedback):
+        layer.setRenderer(self._renderer_of(layer))
+        layer.triggerRepaint()
+
+
+# The framework does not keep post-processors alive.
+_STYLERS = {}
+
+
+def processor(name):
+    """The post-processor of the layer of this name."""
+    return _STYLERS.setdefault(name, Styler({"vertex_displacements": displacements, "patches": patches}[name]))

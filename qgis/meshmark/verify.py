@@ -1,0 +1,174 @@
+"""Verify suspect map: what `meshmark verify` says, its report, and the evidence as layers."""
+
+import json
+import tempfile
+
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingOutputNumber,
+    QgsProcessingOutputString,
+    QgsProcessingParameterFile,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterVectorLayer,
+)
+
+from . import commands, reports, settings, styles
+from .algorithm import Algorithm, file_of_map, sentences
+from .text import tr
+
+# Exit codes with which the command gives a verdict: match, no match, inconclusive.
+VERDICTS = (0, 1, 3)
+
+
+class Verify(Algorithm):
+    NAME = "verify"
+
+    def title(self):
+        return tr("Verify suspect map")
+
+    def about(self):
+        return tr(
+            "Says whether a suspect map is a copy that was marked with your key, and whose. Given one record it"
+            " tests that copy, given a folder of records it finds the recipient. The result is a verdict with the"
+            " probability that it is wrong, a report, and two layers: an arrow for the displacement of every"
+            " matched vertex, coloured by how well it fits in with its neighbours, and the patches of the mesh with"
+            " the evidence of each."
+        )
+
+    def needs(self):
+        commands.meshmark()
+
+    def initAlgorithm(self, configuration=None):
+        vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
+        self.add(
+            QgsProcessingParameterVectorLayer("REFERENCE", tr("Reference (the unmarked map)"), [vector]),
+            tr(
+                "The .reference.gpkg of the export, or the map that was marked, unchanged. All layers of the file"
+                " are used."
+            ),
+        )
+        self.add(
+            QgsProcessingParameterVectorLayer("SUSPECT", tr("Suspect map"), [vector]),
+            tr(
+                "The map in question. All layers of its file are used; of a layer with a filter or unsaved edits,"
+                " what it shows."
+            ),
+        )
+        self.add(
+            QgsProcessingParameterFile("KEY", tr("Key file"), defaultValue=settings.get(settings.KEY_FILE) or None),
+            tr("The secret key with which the map was marked. Only its path is handed on."),
+        )
+        self.add(
+            QgsProcessingParameterFile("RECORD", tr("Record"), optional=True, extension="json"),
+            tr("The record of one copy: is the suspect that copy? It goes before the record folder."),
+        )
+        folder = QgsProcessingParameterFile.Behavior.Folder
+        self.add(
+            QgsProcessingParameterFile(
+                "RECORDS",
+                tr("Record folder"),
+                folder,
+                defaultValue=settings.get(settings.RECORD_FOLDER) or None,
+                optional=True,
+            ),
+            tr("The records of all copies: which of them is the suspect?"),
+        )
+        self.add(
+            QgsProcessingParameterFileDestination(
+                "EVIDENCE_MAP", tr("Evidence map"), tr("GeoPackage (*.gpkg)"), optional=True, createByDefault=True
+            ),
+            tr(
+                "GeoPackage to write the displacements of the matched vertices and the patches to; both are added"
+                " to the project."
+            ),
+        )
+        reports.add_parameters(self)
+        self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
+        self.addOutput(QgsProcessingOutputString("REASON", tr("Why")))
+        self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Recipient the verdict is about")))
+        self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of error, its decimal logarithm")))
+        self.addOutput(QgsProcessingOutputNumber("MATCHED_VERTICES", tr("Matched vertices")))
+
+    def checkParameterValues(self, given, context):
+        ok, message = super().checkParameterValues(given, context)
+        if ok and not self._marks(given, context):
+            return False, tr("Give a record, or a folder of records.")
+        return ok, message
+
+    def _marks(self, given, context):
+        """The option that names the record, or the folder of records."""
+        record = self.parameterAsString(given, "RECORD", context)
+        folder = self.parameterAsString(given, "RECORDS", context)
+        return ["--record", record] if record else ["--records", folder] if folder else []
+
+    def prepare(self, given, context, feedback):
+        self._reference = self.map_layer(given, "REFERENCE", context)
+        self._suspect = self.map_layer(given, "SUSPECT", context)
+        return True
+
+    def process(self, given, context, feedback):
+        evidence = self.parameterAsFileOutput(given, "EVIDENCE_MAP", context)
+        self._report = reports.Report(self, given, context, feedback)
+        with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
+            arguments = [commands.meshmark(), "verify", "--json"]
+            arguments += ["--key", self.parameterAsString(given, "KEY", context), *self._marks(given, context)]
+            arguments += (["--evidence-map", evidence] if evidence else []) + self._report.options()
+            arguments += ["--reference", file_of_map(self._reference, staging, "reference", context, feedback)]
+            arguments += ["--", file_of_map(self._suspect, staging, "suspect", context, feedback)]
+            feedback.setProgressText(tr("Verifying"))
+            found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
+        for line in summary(found):
+            feedback.pushInfo(line)
+        if evidence and context.project():
+            self._add_layers(evidence, context)
+        results = {
+            "VERDICT": found["verdict"],
+            "REASON": found["reason"],
+            "RECIPIENT": found["parameters"]["recipient"],
+            "P_VALUE_LOG10": found["p_value_log10"],
+            "MATCHED_VERTICES": found["vertices"]["matched"],
+        }
+        written = {"EVIDENCE_MAP": evidence, "REPORT": self._report.path}
+        return {**results, **{name: path for name, path in written.items() if path}}
+
+    def _add_layers(self, evidence, context):
+        # They are added in the order of their names, the later one above the other.
+        for layer, title in [
+            ("vertex_displacements", tr("Displacements")),
+            ("patches", tr("Patches")),
+        ]:
+            details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
+            details.setPostProcessor(styles.processor(layer))
+            context.addLayerToLoadOnCompletion(f"{evidence}|layername={layer}", details)
+
+    def postProcessAlgorithm(self, context, feedback):
+        self._report.open()
+        return {}
+
+
+def answer(finished, codes, feedback):
+    """The JSON that the command printed; raises what it says when it failed."""
+    errors, _ = sentences(finished.errors)
+    if finished.code not in codes:
+        ended = tr("meshmark ended with exit code {}.").format(finished.code)
+        raise QgsProcessingException("\n".join(errors or [ended]))
+    for line in errors:
+        feedback.pushWarning(line)
+    return json.loads(finished.output)
+
+
+def summary(found):
+    """The answer in a few lines."""
+    verdicts = {"match": tr("MATCH"), "no-match": tr("NO MATCH"), "inconclusive": tr("INCONCLUSIVE")}
+    yield f"{verdicts.get(found['verdict'], found['verdict'])}: {found['reason']}"
+    recipient, p_log10 = found["parameters"]["recipient"], found["p_value_log10"]
+    if recipient and found["verdict"] == "match":
+        yield tr("Recipient: {}").format(recipient)
+    if p_log10 is not None:
+        yield tr("Probability of so much agreement by chance: 10^{:.1f}").format(p_log10)
+    vertices = found["vertices"]
+    yield tr("{} of {} reference vertices were found among {} of the suspect.").format(
+        vertices["matched"], vertices["reference"], vertices["suspect"]
+    )

@@ -1,0 +1,233 @@
+//! What a verdict rests on, as a map: where the vertices were found, and what each patch says.
+
+use crate::{Error, Result, verify::Request};
+use gdal::{
+    Dataset, DriverManager,
+    vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
+};
+use meshmark_core::{carrier::Carrier, demodulation::Demodulation, ground::Ground, patches::Patches};
+use meshmark_dataset::{CoordinateSystem, Survey};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Equal evidence makes equal bytes: a GeoPackage holds the time of its last change.
+const NO_TIME: &str = "1970-01-01T00:00:00.000Z";
+
+/// The displacements that were demodulated, of every reference vertex.
+pub struct Followed {
+    /// Metres on the ground; `None` where the vertex was not found.
+    pub observed: Vec<Option<[f64; 2]>>,
+    /// 1, or less where the displacement does not fit in with the others.
+    pub weights: Vec<f64>,
+}
+
+/// A reference vertex that was found.
+#[derive(Debug, Clone, Copy)]
+pub struct FoundVertex {
+    /// Where it is in the reference, CRS units.
+    pub at: [f64; 2],
+    /// The patch it is in.
+    pub patch: usize,
+    /// Where it was found, CRS units.
+    pub to: [f64; 2],
+    /// From there to there, metres on the ground.
+    pub moved_m: [f64; 2],
+    /// 1, or less where the displacement does not fit in with the others.
+    pub weight: f64,
+}
+
+/// What one patch says.
+#[derive(Debug, Clone)]
+pub struct PatchEvidence {
+    /// The reference's vertices in it, CRS units.
+    pub vertices: Vec<[f64; 2]>,
+    /// How many of them were found.
+    pub found: usize,
+    /// Standard deviations above that of a random key; `None` where nothing was found or no message is expected.
+    pub score: Option<f64>,
+}
+
+/// Where the vertices were found, and what each patch says.
+#[derive(Debug, Clone)]
+pub struct EvidenceMap {
+    /// CRS of the reference.
+    pub crs: Option<CoordinateSystem>,
+    /// In canonical order.
+    pub vertices: Vec<FoundVertex>,
+    /// All patches, whether anything of them was found or not.
+    pub patches: Vec<PatchEvidence>,
+    /// Place and patch of every reference vertex, until the vertices are added.
+    places: Vec<([f64; 2], usize)>,
+    ground: Ground,
+}
+
+impl EvidenceMap {
+    /// Before anything was found.
+    pub fn new(reference: &Survey, ground: Ground, patches: &Patches) -> Self {
+        let coords = reference.vertices.coords();
+        let mut places: Vec<([f64; 2], usize)> = coords.iter().map(|at| (*at, 0)).collect();
+        for (number, patch) in patches.as_slice().iter().enumerate() {
+            patch.vertices.iter().for_each(|&v| places[v as usize].1 = number);
+        }
+        let of_patch = |patch: &meshmark_core::patches::Patch| PatchEvidence {
+            vertices: patch.vertices.iter().map(|&v| coords[v as usize]).collect(),
+            found: 0,
+            score: None,
+        };
+        let patches = patches.as_slice().iter().map(of_patch).collect();
+        EvidenceMap { crs: reference.crs.clone(), vertices: Vec::new(), patches, places, ground }
+    }
+
+    /// Adds the vertices that were found and says how many they are.
+    pub fn add_vertices(&mut self, followed: &Followed) -> usize {
+        for ((moved_m, weight), (at, patch)) in
+            followed.observed.iter().zip(&followed.weights).zip(&self.places)
+        {
+            let Some(moved_m) = *moved_m else { continue };
+            let unit = self.ground.metres_per_unit(*at);
+            let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];
+            self.vertices.push(FoundVertex { at: *at, to, patch: *patch, moved_m, weight: *weight });
+            self.patches[*patch].found += 1;
+        }
+        self.vertices.len()
+    }
+
+    /// The same with the score of every patch for the message that is expected.
+    pub fn scored(&self, request: &Request, found: Option<&Demodulation>) -> Self {
+        let (vertices, patches) = (self.vertices.clone(), self.patches.clone());
+        let mut scored =
+            EvidenceMap { crs: self.crs.clone(), vertices, patches, places: Vec::new(), ground: self.ground };
+        if let Some((found, message)) = found.zip(request.expected.as_ref()) {
+            let carrier = Carrier::new(&request.key);
+            let scores = found.patch_scores(&carrier, message, self.patches.len());
+            scored.patches.iter_mut().zip(scores).for_each(|(patch, score)| patch.score = score);
+        }
+        scored
+    }
+
+    /// Writes a GeoPackage with the layers `vertex_displacements`, a line for every matched vertex, and `patches`.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&self, target: &Target) -> Result<()> {
+        let failed = |reason: String| target.failed(&reason);
+        let staged = target.workplace.path().join("map.gpkg");
+        self.write_layers(&staged).map_err(|error| failed(error.to_string()))?;
+        if target.path.exists() {
+            return Err(target.exists());
+        }
+        std::fs::rename(&staged, &target.path).map_err(|error| failed(error.to_string()))
+    }
+
+    fn write_layers(&self, path: &Path) -> gdal::errors::Result<()> {
+        gdal::config::set_thread_local_config_option("OGR_CURRENT_DATE", NO_TIME)?;
+        let mut dataset = DriverManager::get_driver_by_name("GPKG")?.create_vector_only(path)?;
+        self.write_displacements(&mut dataset)?;
+        self.write_patches(&mut dataset)?;
+        dataset.close()
+    }
+
+    fn write_displacements(&self, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+        use OGRFieldType::{OFTInteger, OFTReal};
+        let fields = [
+            ("patch", OFTInteger),
+            ("dx_m", OFTReal),
+            ("dy_m", OFTReal),
+            ("moved_m", OFTReal),
+            ("weight", OFTReal),
+        ];
+        let (kind, rows) = (OGRwkbGeometryType::wkbLineString, self.vertices.iter());
+        self.write_layer(dataset, ("vertex_displacements", kind), &fields, rows, |vertex, feature| {
+            let [dx, dy] = vertex.moved_m;
+            feature.set_field_integer(0, vertex.patch as i32)?;
+            for (field, value) in (1..).zip([dx, dy, dx.hypot(dy), vertex.weight]) {
+                feature.set_field_double(field, value)?;
+            }
+            let mut line = Geometry::empty(kind)?;
+            [vertex.at, vertex.to].into_iter().for_each(|[x, y]| line.add_point_2d((x, y)));
+            Ok(line)
+        })
+    }
+
+    fn write_patches(&self, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+        use OGRFieldType::{OFTInteger, OFTReal};
+        let fields =
+            [("patch", OFTInteger), ("vertices", OFTInteger), ("found", OFTInteger), ("score", OFTReal)];
+        let (kind, rows) = (OGRwkbGeometryType::wkbPolygon, self.patches.iter().enumerate());
+        self.write_layer(dataset, ("patches", kind), &fields, rows, |(number, patch), feature| {
+            for (field, value) in [number, patch.vertices.len(), patch.found].into_iter().enumerate() {
+                feature.set_field_integer(field, value as i32)?;
+            }
+            if let Some(score) = patch.score {
+                feature.set_field_double(3, score)?;
+            }
+            points(&patch.vertices)?.convex_hull()
+        })
+    }
+
+    /// One layer in one transaction; `fill` sets a row's fields and gives its geometry.
+    fn write_layer<Row>(
+        &self,
+        dataset: &mut Dataset,
+        (name, ty): (&str, OGRwkbGeometryType::Type),
+        fields: &[(&str, OGRFieldType::Type)],
+        rows: impl Iterator<Item = Row>,
+        fill: impl Fn(Row, &mut Feature) -> gdal::errors::Result<Geometry>,
+    ) -> gdal::errors::Result<()> {
+        let mut transaction = dataset.start_transaction()?;
+        let srs = self.crs.as_ref().map(CoordinateSystem::spatial_ref);
+        let layer: Layer = transaction.create_layer(LayerOptions { name, srs, ty, options: None })?;
+        layer.create_defn_fields(fields)?;
+        for row in rows {
+            let mut feature = Feature::new(layer.defn())?;
+            let geometry = fill(row, &mut feature)?;
+            feature.set_geometry(geometry)?;
+            feature.create(&layer)?;
+        }
+        transaction.commit()
+    }
+}
+
+fn points(places: &[[f64; 2]]) -> gdal::errors::Result<Geometry> {
+    let mut geometry = Geometry::empty(OGRwkbGeometryType::wkbMultiPoint)?;
+    for [x, y] in places {
+        let mut point = Geometry::empty(OGRwkbGeometryType::wkbPoint)?;
+        point.add_point_2d((*x, *y));
+        geometry.add_geometry(point)?;
+    }
+    Ok(geometry)
+}
+
+/// A file that does not exist yet, and a private folder beside it to make it in. Before a long verification it
+/// tells whether the file can be written.
+pub struct Target {
+    path: PathBuf,
+    workplace: TempDir,
+}
+
+impl Target {
+    /// # Errors
+    /// The file exists, or its folder cannot be written to.
+    pub fn new(path: &Path) -> Result<Self> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.is_dir() {
+            return Err(unwritable(path, "its folder does not exist"));
+        }
+        let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder);
+        let workplace = workplace.map_err(|error| unwritable(path, &error.to_string()))?;
+        let target = Target { path: path.into(), workplace };
+        if target.path.exists() { Err(target.exists()) } else { Ok(target) }
+    }
+
+    fn exists(&self) -> Error {
+        Error::Usage(format!("{} exists: name another file for --evidence-map", self.path.display()))
+    }
+
+    fn failed(&self, reason: &str) -> Error {
+        unwritable(&self.path, reason)
+    }
+}
+
+fn unwritable(path: &Path, reason: &str) -> Error {
+    Error::Usage(format!("{} cannot be written: {reason}", path.display()))
+}

@@ -1,0 +1,81 @@
+//! `meshmark verify --evidence-map`: the file a GIS shows.
+
+use gdal::{Dataset, vector::LayerAccess};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
+}
+
+/// Writes the map of the evidence in `suspect` and gives the numbers of vertices that the report names.
+fn verify(suspect: &Path, map: &Path) -> [u64; 2] {
+    let output = Command::new(env!("CARGO_BIN_EXE_meshmark"))
+        .args(["verify", "--json", "--key"])
+        .arg(fixture("vectors/key.json"))
+        .arg("--record")
+        .arg(fixture("vectors/record.json"))
+        .arg("--reference")
+        .arg(fixture("kotka.gpkg"))
+        .arg("--evidence-map")
+        .arg(map)
+        .arg(suspect)
+        .output()
+        .unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));
+    ["matched", "reference"].map(|name| report["vertices"][name].as_u64().unwrap())
+}
+
+/// Numbers of an SQL query.
+fn numbers<const N: usize>(map: &Path, query: &str) -> [f64; N] {
+    let dataset = Dataset::open(map).unwrap();
+    let mut rows = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT).unwrap().unwrap();
+    let row = rows.features().next().unwrap();
+    std::array::from_fn(|field| row.field_as_double(field).unwrap().unwrap())
+}
+
+#[test]
+fn every_matched_vertex_is_there_and_every_patch_has_its_score() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("map.gpkg");
+    let [matched, reference] = verify(&fixture("vectors/marked.gpkg"), &map);
+    let [rows, least_m, most_m, off] = numbers(
+        &map,
+        "SELECT count(*), min(moved_m), max(moved_m), max(abs(moved_m * moved_m - dx_m * dx_m - dy_m * dy_m)) \
+         FROM vertex_displacements",
+    );
+    assert_eq!(rows as u64, matched);
+    assert!(least_m >= 0.0 && most_m <= 0.75 && off < 1e-12, "no vertex of the fixture moved further");
+    let [all, found, least] = numbers(&map, "SELECT sum(vertices), sum(found), min(score) FROM patches");
+    assert_eq!([found as u64, all as u64], [matched, reference]);
+    assert!(least > 10.0, "every patch of a whole copy shows the mark: {least}");
+    let layers = Dataset::open(&map).unwrap();
+    let crs = layers.layer_by_name("patches").unwrap().spatial_ref().unwrap();
+    assert_eq!(crs.auth_code().unwrap(), 3067);
+    let names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names, ["map.gpkg"]);
+}
+
+#[test]
+fn equal_evidence_makes_equal_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = ["a.gpkg", "b.gpkg"].map(|name| {
+        verify(&fixture("vectors/marked.gpkg"), &folder.path().join(name));
+        fs::read(folder.path().join(name)).unwrap()
+    });
+    assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn a_suspect_that_is_elsewhere_makes_patches_without_vertices() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("map.gpkg");
+    verify(&fixture("helsinki.gpkg"), &map);
+    let [patches, found, scores] = numbers(&map, "SELECT count(*), sum(found), count(score) FROM patches");
+    assert!(patches > 0.0 && found == 0.0 && scores == 0.0);
+    assert_eq!(numbers(&map, "SELECT count(*) FROM vertex_displacements"), [0.0]);
+}
