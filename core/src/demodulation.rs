@@ -85,6 +85,25 @@ impl Demodulation {
         ratio(dot(&self.code.encode(message), &self.estimate), dot(&self.estimate, &self.estimate).sqrt())
     }
 
+    /// The [`Self::mark_score`] of each of `patches` patches by itself; `None` where nothing was observed to move.
+    pub fn patch_scores(&self, carrier: &Carrier, message: &Message, patches: usize) -> Vec<Option<f64>> {
+        let signs = self.code.encode(message);
+        let carriers = self.chip_correlations.len() / patches / 2;
+        let chip_rate = carriers / signs.len();
+        let score = |(patch, of_patch): (usize, &[f64])| {
+            let on_axis = |axis: usize| {
+                let seen = of_patch[axis * carriers..].iter().take(carriers);
+                let chips = carrier.chips(patch, axis, carriers);
+                let signed =
+                    |(i, (chip, a)): (usize, (f64, &f64))| chip * signs[bit_of_coefficient(i + 1, chip_rate)] * a;
+                chips.into_iter().zip(seen).enumerate().map(signed).sum::<f64>()
+            };
+            let deviation = dot(of_patch, of_patch).sqrt();
+            (deviation > 0.0).then(|| (on_axis(0) + on_axis(1)) / deviation)
+        };
+        self.chip_correlations.par_chunks(2 * carriers).enumerate().map(score).collect()
+    }
+
     /// The [`Self::mark_score`] of `count` decoy keys on the same suspect: random signs instead of chips, those
     /// of decoy k from ChaCha20 stream k.
     pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {

@@ -9,7 +9,8 @@ use meshmark_core::{
 };
 use meshmark_verifier::{
     Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::compare,
-    explain::Inputs, progress::Progress, reading, registration::Start, verify, verify::check_key,
+    evidence::{self, Provenance}, html, inputs::Inputs, progress::Progress, reading, registration::Start,
+    report::Report, report_file::{Format, ReportFile}, verify, verify::check_key,
 };
 use std::{io::Write, path::PathBuf};
 
@@ -99,6 +100,9 @@ struct VerifyArgs {
     /// Say in sentences what was compared, found and not tested
     #[arg(long, conflicts_with = "json")]
     explain: bool,
+    /// Write a report to read and print (.html), or to process (.json); the file must not exist
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     marking: MarkingFlags,
 }
@@ -201,20 +205,40 @@ fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
 }
 
 fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
-    let inputs = args.explain.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
-    let (json, records, record) = (args.json, args.records.clone(), args.record.clone());
+    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
+    let wanted = args.explain || file.is_some();
+    let inputs = wanted.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
+    let (json, explain) = (args.json, args.explain);
+    let (records, record) = (args.records.clone(), args.record.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut warn = |text: &str| eprintln!("meshmark: {text}");
-    let report = match &records {
+    let mut report = match &records {
         Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
         None => verify(&request, &mut progress)?,
     };
+    let evidence = report.evidence.take(); // a report file has it
     print!("{}", if json { report.to_json() } else { report.to_text() });
-    if let Some(inputs) = inputs {
-        print!("\n{}", inputs.explain(&report, record.as_deref(), records.as_deref())?);
+    let Some(inputs) = inputs else { return Ok(report.exit_code()) };
+    let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
+    let inputs = inputs.with_record(record.or_else(best).as_deref())?;
+    if explain {
+        print!("\n{}", inputs.explain(&report));
+    }
+    if let Some(file) = file {
+        let provenance = Provenance::new(&report, inputs, command_line());
+        let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
+        file.write(&match file.format() {
+            Format::Html => html::verification(&report),
+            Format::Json => report.to_json(),
+        })?;
     }
     Ok(report.exit_code())
+}
+
+/// That of this process.
+fn command_line() -> String {
+    evidence::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }
 
 /// Puts key, record and flags together.
@@ -251,6 +275,7 @@ fn request(args: VerifyArgs) -> Result<Request> {
         demodulator: args.demodulator,
         radius_m: args.radius,
         significance: args.significance,
+        sketch: args.report.is_some(),
     })
 }
 

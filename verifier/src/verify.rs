@@ -11,6 +11,7 @@ use crate::{
     reading::{self, Reading},
     registration::{LEAST_MATCHED, OUT_OF_PLACE, Registrar, Registration, Start, TIMES_CHANCE},
     report::{Report, VertexCounts},
+    sketch::{Scene, Sketch},
 };
 use meshmark_core::{
     carrier::Carrier,
@@ -68,6 +69,8 @@ pub struct Request {
     pub radius_m: f64,
     /// p-values below this are a match.
     pub significance: f64,
+    /// Whether to keep what a report file draws.
+    pub sketch: bool,
 }
 
 impl Request {
@@ -95,6 +98,8 @@ pub struct Examination {
     pub found: std::result::Result<Demodulation, String>,
     /// How decoy keys score.
     pub decoys: Option<Decoys>,
+    /// What a report file draws, when that was asked for.
+    pub sketch: Option<Sketch>,
 }
 
 /// Verifies one suspect.
@@ -168,15 +173,27 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         suspect_crs,
         found: Err(unregistered(&vertices, chance, start)),
         decoys: None,
+        sketch: None,
     };
-    if matches.count >= LEAST_MATCHED && matches.count >= TIMES_CHANCE * chance {
+    let mut scene = Scene {
+        reference,
+        suspect: &suspect,
+        moved: &moved,
+        ground: &ground,
+        patches: &patches,
+        matches,
+        deformation: None,
+    };
+    if scene.matches.count >= LEAST_MATCHED && scene.matches.count >= TIMES_CHANCE * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
         let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
-        let found = demodulate(request, &tracking, &matches, &mut seen.vertices, progress);
+        let found = demodulate(request, &tracking, &mut scene, progress);
         let found = found.map_err(|error| of_reference(request, error))?;
+        seen.vertices.matched = scene.matches.count;
         seen.decoys = Decoys::new(&found, &suspect.vertices, &reference.vertices);
         seen.found = Ok(found);
     }
+    seen.sketch = request.sketch.then(|| scene.sketch(&seen.registration));
     Ok(seen)
 }
 
@@ -209,25 +226,26 @@ fn unregistered(vertices: &VertexCounts, chance: usize, start: Start) -> String 
     )
 }
 
-/// The paper's demodulator takes the matches as they are; the joint one follows a deformation first.
+/// The paper's demodulator takes the matches as they are; the joint one follows a deformation first, which changes
+/// the matches of the scene.
 fn demodulate(
     request: &Request,
     tracking: &Tracking,
-    matches: &Matches,
-    vertices: &mut VertexCounts,
+    scene: &mut Scene,
     progress: &mut Progress,
 ) -> meshmark_core::Result<Demodulation> {
     let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
     let (carrier, steps) = (Carrier::new(&request.key), patches.as_slice().len() as u64);
     if request.demodulator == Demodulator::Paper {
         progress.start("demodulation", steps);
-        let matched = tracking.displacements(matches);
+        let matched = tracking.displacements(&scene.matches);
         return demodulation::paper(patches, &carrier, &matched, bits, parameters, &progress.stepper());
     }
     progress.start("deformation", 0);
     let carriers = patches.carriers(bits, parameters)?;
-    let (observed, disturbance) = tracking.follow(carriers, request)?;
-    vertices.matched = observed.iter().flatten().count();
+    let (matches, observed, disturbance) = tracking.follow(carriers, request)?;
+    scene.matches = matches;
+    scene.deformation = Some(disturbance.deformation);
     progress.start("demodulation", steps);
     demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &progress.stepper())
 }
@@ -302,9 +320,10 @@ impl Tracking<'_> {
         &self,
         carriers: usize,
         request: &Request,
-    ) -> meshmark_core::Result<(Vec<Option<[f64; 2]>>, Prediction)> {
+    ) -> meshmark_core::Result<(Matches, Vec<Option<[f64; 2]>>, Prediction)> {
         let coords = self.reference.vertices.coords();
-        let mut observed = self.displacements(&self.match_joined(coords, request.radius_m));
+        let mut matches = self.match_joined(coords, request.radius_m);
+        let mut observed = self.displacements(&matches);
         let amplitude_m = request.parameters.amplitude_m;
         let mark_m = mark_deviation_m(self.patches, carriers, amplitude_m);
         let fit = |observed: &Observed| {
@@ -318,11 +337,15 @@ impl Tracking<'_> {
                 let kept = prediction.without_outliers(&observed, mark_m);
                 if kept != observed {
                     prediction = fit(&kept)?;
+                    matches.keep(|vertex| kept[vertex].is_some());
                     observed = kept;
                 }
-                return Ok(prediction.shape_noise(self.patches, &observed, carriers, amplitude_m));
+                let (shaped, prediction) =
+                    prediction.shape_noise(self.patches, &observed, carriers, amplitude_m);
+                return Ok((matches, shaped, prediction));
             }
-            observed = self.displacements(&self.match_around(&prediction, request.radius_m));
+            matches = self.match_around(&prediction, request.radius_m);
+            observed = self.displacements(&matches);
             round += 1;
         }
     }
@@ -345,7 +368,6 @@ impl Tracking<'_> {
 
     /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
     fn displacements(&self, matches: &Matches) -> Vec<Option<[f64; 2]>> {
-        let pairs = self.reference.vertices.coords().iter().zip(&matches.suspect_of);
-        pairs.map(|(r, s)| s.map(|s| self.ground.metres_between(*r, self.moved[s as usize]))).collect()
+        matches.displacements_m(self.reference.vertices.coords(), self.moved, self.ground)
     }
 }
