@@ -8,7 +8,7 @@ use meshmark_core::{
     record::Record,
 };
 use meshmark_verifier::{
-    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::compare,
+    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::{Comparison, compare, detail::Compared},
     evidence::{self, Provenance}, html, inputs::Inputs, progress::Progress, reading, registration::Start,
     report::Report, report_file::{Format, ReportFile}, verify, verify::check_key,
 };
@@ -60,6 +60,9 @@ struct CompareArgs {
     /// Print the comparison as one JSON object
     #[arg(long)]
     json: bool,
+    /// Write a report to read and print (.html), or to process (.json); the file must not exist
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -199,8 +202,19 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
 
 fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
     let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
-    let comparison = compare(&args.reference, &args.marked, layers, args.precision)?;
+    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
+    let provenance = file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
+    let mut comparison = compare(&args.reference, &args.marked, layers, args.precision, file.is_some())?;
+    let detail = comparison.detail.take(); // a report file has it
     print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
+    if let Some((file, mut detail)) = file.zip(detail) {
+        detail.provenance = provenance;
+        let comparison = Comparison { detail: Some(detail), ..comparison };
+        file.write(&match file.format() {
+            Format::Html => html::comparison(&comparison),
+            Format::Json => comparison.to_json(),
+        })?;
+    }
     Ok(ExitCode::Match)
 }
 

@@ -51,15 +51,20 @@ impl Evidence {
 impl Provenance {
     /// `command` as the user gave it.
     pub fn new(report: &Report, inputs: Inputs, command: String) -> Self {
-        let gdal = gdal::version::VersionInfo::release_name();
         Provenance {
             inputs,
             reference_vertices_sha256: report.reference_digest.clone(),
             suspect_crs: report.suspect_crs.clone(),
             command,
-            versions: vec![report.parameters.software.clone(), format!("GDAL {gdal}")],
+            versions: versions(),
         }
     }
+}
+
+/// This program, and the library that reads the maps.
+pub(crate) fn versions() -> Vec<String> {
+    let gdal = gdal::version::VersionInfo::release_name();
+    vec![format!("meshmark {}", env!("CARGO_PKG_VERSION")), format!("GDAL {gdal}")]
 }
 
 /// A command line without what only says where its output goes, and the report as `report.html`.

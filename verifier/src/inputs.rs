@@ -24,7 +24,7 @@ pub struct Inputs {
 }
 
 /// A file or folder and what identifies it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Digested {
     /// Its path, as it was given.
     pub path: String,
@@ -53,7 +53,7 @@ impl Inputs {
 
 /// SHA-256 of a file; of a folder, or a file with companions of the same name, that of the sorted list of
 /// their digests as `sha256sum` prints it.
-fn digest(path: &Path) -> Result<Digested> {
+pub(crate) fn digest(path: &Path) -> Result<Digested> {
     let failed = |error: io::Error| {
         Error::Unreadable(format!("{} cannot be read to its end: {error}", path.display()))
     };

@@ -63,12 +63,11 @@ impl Chart<'_> {
 
 /// A line across a chart with a name at its top.
 fn line(x: f64, name: &str) -> Markup {
-    let anchor = if x > WIDTH / 2.0 { "end" } else { "start" };
-    let beside = if x > WIDTH / 2.0 { x - 7.0 } else { x + 7.0 };
+    let (side, beside) = if x > WIDTH / 2.0 { ("before", x - 7.0) } else { ("after", x + 7.0) };
     html! {
         path.tested d=(format!("M{x:.1} {HEIGHT}V0")) {}
         path.tested-head d=(format!("M{x:.1} {HEIGHT}l-5-9h10z")) {}
-        text.tested x=(format!("{beside:.1}")) y="12" text-anchor=(anchor) { (name) }
+        text.tested.(side) x=(format!("{beside:.1}")) y="12" { (name) }
     }
 }
 

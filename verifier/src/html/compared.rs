@@ -13,8 +13,9 @@ use maud::{Markup, html};
 pub fn compared(report: &Report) -> Markup {
     let content = html! {
         @if let Some(provenance) = &report.provenance { (files(report, provenance)) }
-        (settings(report))
+        p { @for text in explain::bound(report) { (super::sentence(&text)) } }
         @if let Some(candidates) = &report.candidates { (tried(report, candidates)) }
+        (settings(report))
     };
     section("What was compared", &content)
 }
@@ -35,6 +36,7 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
             Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } })),
         ),
         ("Record", Some(record(report, inputs.record.as_ref()))),
+        ("Recipient", report.parameters.recipient.as_ref().map(|r| html! { b { (printable(r)) } })),
     ])
 }
 
@@ -65,27 +67,16 @@ fn settings(report: &Report) -> Markup {
     let grid = p.precision_crs_units.map(|grid| html! { (grid) " CRS units" });
     let layers = p.layers.as_ref().map(|layers| html! { (printable(&layers.join(", "))) });
     html! {
-        table.facts { tbody {
-            tr { th scope="row" { "Recipient" } td {
-                @match &p.recipient {
-                    Some(recipient) => b { (printable(recipient)) },
-                    None => "none named",
-                }
-            } }
-        } }
-        p { @for text in explain::bound(report) { (super::sentence(&text)) } }
-        details open[false] {
-            summary { "How the mark was assumed to be made, and how it was tested" }
-            (table(&[
-                ("Amplitude", text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m))),
-                ("Message", text(chips)),
-                ("Shape", text(format!("{} vertices", word(&p.shape)))),
-                ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
-                ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
-                ("Matching radius", text(format!("{} m", p.radius_m))),
-                ("Demodulator", text(p.demodulator.into())),
-            ]))
-        }
+        h3 { "How the mark was assumed to be made, and how it was tested" }
+        (table(&[
+            ("Amplitude", text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m))),
+            ("Message", text(chips)),
+            ("Shape", text(format!("{} vertices", word(&p.shape)))),
+            ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
+            ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
+            ("Matching radius", text(format!("{} m", p.radius_m))),
+            ("Demodulator", text(p.demodulator.into())),
+        ]))
     }
 }
 
@@ -117,7 +108,7 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                         } }
                         td { (printable(&entry.record)) }
                         td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } }
-                        td.number { @if let Some(p) = entry.p_value_log10 { (words::probability(p)) } @else { "–" } }
+                        td.number { @if let Some(p) = entry.p_value_log10 { (words::raised(&words::probability(p))) } @else { "–" } }
                         td { @if number < candidates.matches && entry.p_value_log10.is_some_and(|p| p < significance) { b { "match" } } }
                     }
                 }

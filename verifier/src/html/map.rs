@@ -5,11 +5,7 @@ use super::{
     frame::{Frame, largest_below, metres},
     section,
 };
-use crate::{
-    evidence::Evidence,
-    report::Report,
-    sketch::{PatchPlace, Sample},
-};
+use crate::{evidence::Evidence, report::Report, sketch::PatchPlace};
 use maud::{Markup, html};
 use std::fmt::Write as _;
 
@@ -83,9 +79,9 @@ fn patches(evidence: &Evidence, frame: &Frame) -> Markup {
     let caption = html! {
         b { "Evidence by patch. " }
         @if scored {
-            "The mark is in " (count(places.len())) " patches, each with its own secret pattern. How many standard \
-             deviations each of them alone is above what a wrong key would show: a wrong key gives values around 0, \
-             hardly one above 3. " (count(seen.iter().filter(|s| **s >= 2.0).count())) " of the " (count(seen.len()))
+            "The mark is in " (count(places.len())) " patches, each with its own secret pattern. The numbers say \
+             how many standard deviations each of them by itself is above what a wrong key would show; a wrong key gives \
+             values around 0, hardly one above 3. " (count(seen.iter().filter(|s| **s >= 2.0).count())) " of the " (count(seen.len()))
             " patches that were seen reach 2 by themselves."
             (legend(evidence))
         } @else {
@@ -128,7 +124,7 @@ fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
             use href="#lines" {}
             path.missing d=(marks(frame, &sample.missing, CROSS)) {}
             path.inserted d=(marks(frame, &sample.inserted, TRIANGLE)) {}
-            path.arrows d=(arrows.path(frame, sample)) {}
+            path.arrows d=(arrows.path(frame, &sample.matched)) {}
             (frame.foot(arrows.key(frame).as_ref()))
         }
     };
@@ -137,9 +133,7 @@ fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     let shown = |shown: usize, all: usize| html! { @if shown < all { ", " (count(shown)) " of them drawn" } };
     let caption = html! {
         b { "Vertices. " }
-        "How far each vertex of the reference is displaced in the suspect, after registration"
-        @if arrows.times > 1.0 { ", drawn " (count(arrows.times as usize)) " times as long as it is" }
-        "."
+        "How far each vertex of the reference is displaced in the suspect, after registration" (arrows.scale()) "."
         ul.legend {
             li { (swatch("arrows", "M-40 20L30-15m-28-2l28 2l-14 24")) "matched: " (count(v.matched)) (shown(sample.matched.len(), v.matched)) }
             li { (swatch("missing", &format!("M0 0{CROSS}"))) "missing from the suspect: " (count(sketch.missing)) (shown(sample.missing.len(), sketch.missing)) }
@@ -152,7 +146,7 @@ fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
 const CROSS: &str = "m-14-14l28 28m0-28l-28 28";
 const TRIANGLE: &str = "m0-18l17 30h-34z";
 
-fn marks(frame: &Frame, places: &[[f64; 2]], shape: &str) -> String {
+pub fn marks(frame: &Frame, places: &[[f64; 2]], shape: &str) -> String {
     let mut path = String::new();
     for place in places {
         let [x, y] = frame.at(*place);
@@ -163,7 +157,7 @@ fn marks(frame: &Frame, places: &[[f64; 2]], shape: &str) -> String {
 
 /// Displacements as arrows, longer than they are.
 pub struct Arrows {
-    pub times: f64,
+    times: f64,
     rms_m: f64,
 }
 
@@ -179,9 +173,10 @@ impl Arrows {
         Arrows { times, rms_m }
     }
 
-    pub fn path(&self, frame: &Frame, sample: &Sample) -> String {
+    /// `vertices`: place, CRS units, and displacement, metres.
+    pub fn path(&self, frame: &Frame, vertices: &[[f64; 4]]) -> String {
         let mut path = String::new();
-        for [x, y, dx, dy] in &sample.matched {
+        for [x, y, dx, dy] in vertices {
             let [x, y] = frame.at([*x, *y]);
             let _ = write!(path, "M{x} {y}{}", self.arrow(frame, [*dx, *dy]));
         }
@@ -199,7 +194,12 @@ impl Arrows {
         let head = (length / 3.0).min(26.0) / length;
         let side = |sign: f64| [head * (-dx - sign * 0.5 * dy), head * (-dy + sign * 0.5 * dx)];
         let ([ax, ay], [bx, by]) = (side(1.0), side(-1.0));
-        format!("l{dx:.0} {dy:.0}l{ax:.0} {ay:.0}M0 0").replace("M0 0", &format!("m{:.0} {:.0}l{bx:.0} {by:.0}", -ax, -ay))
+        format!("l{dx:.0} {dy:.0}l{ax:.0} {ay:.0}m{:.0} {:.0}l{bx:.0} {by:.0}", -ax, -ay)
+    }
+
+    /// To end a sentence with.
+    pub fn scale(&self) -> Markup {
+        html! { @if self.times > 1.0 { ", drawn " (count(self.times as usize)) " times as long as it is" } }
     }
 
     /// An arrow of a round length and how long it is.

@@ -1,5 +1,7 @@
 //! Probabilities as people say them.
 
+use maud::{Markup, html};
+
 /// How often chance does as well, in words and number, to end a sentence with: "in about 43 of 100 tries".
 pub fn how_often(p_log10: f64) -> String {
     if p_log10 > -2.0 {
@@ -51,6 +53,26 @@ pub fn probability(p_log10: f64) -> String {
     let digit = 10f64.powf(p_log10 - power);
     let (digit, power) = if digit >= 9.95 { (1.0, power + 1.0) } else { (digit, power) };
     format!("{digit:.1} × 10{}", superscript(power as i32))
+}
+
+/// Text with its raised digits as the page raises them, which looks the same in every font.
+pub fn raised(text: &str) -> Markup {
+    let plain = |c: char| match c {
+        '⁻' => Some('−'),
+        _ => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|digit| digit == c).and_then(|d| char::from_digit(d as u32, 10)),
+    };
+    let mut rest = text;
+    html! {
+        @while !rest.is_empty() {
+            @let at = rest.find(|c| plain(c).is_some()).unwrap_or(rest.len());
+            @let (before, after) = rest.split_at(at);
+            @let end = after.find(|c| plain(c).is_none()).unwrap_or(after.len());
+            @let (digits, others) = after.split_at(end);
+            (before)
+            @if !digits.is_empty() { sup { (digits.chars().filter_map(plain).collect::<String>()) } }
+            @let () = rest = others;
+        }
+    }
 }
 
 fn superscript(number: i32) -> String {

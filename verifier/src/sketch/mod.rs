@@ -13,6 +13,7 @@ use meshmark_core::{
     deformation::Deformation,
     ground::Ground,
     patches::{Patch, Patches},
+    vertices::VertexTable,
 };
 use meshmark_dataset::Survey;
 use serde::Serialize;
@@ -120,7 +121,7 @@ impl Scene<'_> {
     /// Thins the map.
     pub fn sketch(&self, registration: &Registration) -> Sketch {
         let coords = self.reference.vertices.coords();
-        let extent = Extent::of(self.reference, self.ground);
+        let extent = Extent::of(&self.reference.vertices, self.ground);
         let displacements = self.matches.displacements_m(coords, self.moved, self.ground);
         let lengths: Vec<f64> = displacements.iter().flatten().map(|[x, y]| x.hypot(*y)).collect();
         let inserted = self.inserted();
@@ -176,9 +177,9 @@ impl Scene<'_> {
 }
 
 impl Extent {
-    pub(crate) fn of(map: &Survey, ground: &Ground) -> Self {
-        let (lower, upper) = map.vertices.bounds();
-        Extent { lower, upper, metres_per_unit: ground.metres_per_unit(map.vertices.centre()) }
+    pub(crate) fn of(vertices: &VertexTable, ground: &Ground) -> Self {
+        let (lower, upper) = vertices.bounds();
+        Extent { lower, upper, metres_per_unit: ground.metres_per_unit(vertices.centre()) }
     }
 
     /// Width and height on the ground, metres.
@@ -188,7 +189,7 @@ impl Extent {
 }
 
 /// Arrows need more room than marks.
-const ARROWS: usize = 44;
+pub(crate) const ARROWS: usize = 44;
 const MARKS: usize = 72;
 
 fn sample(

@@ -31,4 +31,14 @@ impl Thinning {
     pub fn cell_of(&self, point: [f64; 2]) -> [u32; 2] {
         [0, 1].map(|axis| ((point[axis] - self.lower[axis]) / self.cell[axis]) as u32)
     }
+
+    /// Its middle.
+    pub fn middle_of(&self, cell: [u32; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| self.lower[axis] + (f64::from(cell[axis]) + 0.5) * self.cell[axis])
+    }
+
+    /// Width and height of a cell, CRS units.
+    pub fn cell(&self) -> [f64; 2] {
+        self.cell
+    }
 }
