@@ -52,11 +52,12 @@ faults: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped, Python and QGIS; installs them.
+# A PostGIS of its own, started and stopped, Python, QGIS, and a browser that reads reports; installs them.
 hosts: build
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
 	host-tests/hosts/qgis.sh
+	host-tests/hosts/chromium.sh
 
 fixtures:
 	fixtures/make_fixtures.sh

@@ -34,9 +34,7 @@ enum Subcommands {
         key_file: PathBuf,
     },
     /// Say whether a suspect map carries a mark
-    ///
-    /// Exit codes: 0 match, 1 no match, 2 usage, 3 inconclusive, 4 the record does not belong to this
-    /// reference or key, 5 unreadable input, 6 too large.
+    #[command(long_about = about_verify())]
     Verify(Box<VerifyArgs>),
     /// Say what marking did to a map: displacement, angles, areas, topology
     ///
@@ -158,6 +156,11 @@ fn probability(text: &str) -> std::result::Result<f64, String> {
         Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
         _ => Err("give a number between 0 and 1".into()),
     }
+}
+
+fn about_verify() -> String {
+    let codes = ExitCode::ALL.map(|code| format!("{} {}", code as u8, code.meaning())).join(", ");
+    format!("Say whether a suspect map carries a mark\n\nExit codes: {codes}.")
 }
 
 /// Runs the command of this process.

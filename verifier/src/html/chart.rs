@@ -95,7 +95,7 @@ pub fn decoys(report: &Report) -> Markup {
             };
             let caption = html! {
                 b { "The score among decoys. " }
-                (count(decoys.count)) " keys that were made up score " (format!("{:.2}", decoys.mean)) " on average, with a standard \
+                (count(decoys.count)) " keys that were made up score " (format!("{:.2}", decoys.mean).replace('-', "−")) " on average, with a standard \
                  deviation of " (format!("{:.2}", decoys.standard_deviation)) " and at most " (format!("{:.1}", decoys.largest))
                 "; the curve is the law that the probabilities rest on, mean 0 and standard deviation 1. "
                 @match tested {

@@ -15,7 +15,6 @@ pub fn compared(report: &Report) -> Markup {
         @if let Some(provenance) = &report.provenance { (files(report, provenance)) }
         p { @for text in explain::bound(report) { (super::sentence(&text)) } }
         @if let Some(candidates) = &report.candidates { (tried(report, candidates)) }
-        (settings(report))
     };
     section("What was compared", &content)
 }
@@ -54,30 +53,30 @@ fn record(report: &Report, record: Option<&Digested>) -> Markup {
     }
 }
 
-fn settings(report: &Report) -> Markup {
+/// How the mark was assumed to be made, and how it was tested.
+pub fn settings(report: &Report) -> Markup {
     let p = &report.parameters;
     let text = |text: String| Some(html! { (text) });
     let chips = format!(
-        "{} in {} coefficients of every patch and axis, patches of {} vertices or more, basis {}",
-        if p.code == meshmark_core::code::Code::Ldpc { "error-correcting code (LDPC)" } else { "every bit repeated" },
+        "{}, {} coefficient{} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
+        if p.code == meshmark_core::code::Code::Ldpc { "as an error-correcting code word (LDPC)" } else { "repeated bits" },
         p.chip_rate,
+        if p.chip_rate == 1 { "" } else { "s" },
         p.patch_size,
         word(&p.basis)
     );
     let grid = p.precision_crs_units.map(|grid| html! { (grid) " CRS units" });
     let layers = p.layers.as_ref().map(|layers| html! { (printable(&layers.join(", "))) });
-    html! {
-        h3 { "How the mark was assumed to be made, and how it was tested" }
-        (table(&[
-            ("Amplitude", text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m))),
-            ("Message", text(chips)),
-            ("Shape", text(format!("{} vertices", word(&p.shape)))),
-            ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
-            ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
-            ("Matching radius", text(format!("{} m", p.radius_m))),
-            ("Demodulator", text(p.demodulator.into())),
-        ]))
-    }
+    let content = table(&[
+        ("Amplitude", text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m))),
+        ("Message", text(chips)),
+        ("Shape", text(format!("{} vertices", word(&p.shape)))),
+        ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
+        ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
+        ("Matching radius", text(format!("{} m", p.radius_m))),
+        ("Demodulator", text(p.demodulator.into())),
+    ]);
+    section("How the mark was assumed to be made and tested", &content)
 }
 
 /// The word that the JSON has.

@@ -97,7 +97,7 @@ fn figures(comparison: &Comparison) -> Markup {
 }
 
 fn percent(share: f64, decimals: usize) -> String {
-    format!("{:.decimals$} %", 100.0 * share)
+    format!("{:.decimals$}\u{a0}%", 100.0 * share)
 }
 
 fn files(provenance: &Compared) -> Markup {

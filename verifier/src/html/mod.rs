@@ -26,6 +26,7 @@ pub fn verification(report: &Report) -> String {
         (message::message(report))
         (chart::decoys(report))
         (registration::registration(report))
+        (compared::settings(report))
         (limits::limits(report))
     };
     page("Verification of a watermark", &report.parameters.software, &body)

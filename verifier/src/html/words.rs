@@ -14,7 +14,7 @@ pub fn how_often(p_log10: f64) -> String {
     let number = match (digit as u32, power) {
         (_, ..6) => super::count((digit * 10f64.powi(power)) as usize),
         (1, _) => format!("10{}", superscript(power)),
-        (digit, _) => format!("{digit} × 10{}", superscript(power)),
+        (digit, _) => format!("{digit}\u{a0}×\u{a0}10{}", superscript(power)),
     };
     match in_words(digit as usize, power) {
         Some(words) => format!("less than once in {words} tries ({number})"),
@@ -52,7 +52,7 @@ pub fn probability(p_log10: f64) -> String {
     let power = p_log10.floor();
     let digit = 10f64.powf(p_log10 - power);
     let (digit, power) = if digit >= 9.95 { (1.0, power + 1.0) } else { (digit, power) };
-    format!("{digit:.1} × 10{}", superscript(power as i32))
+    format!("{digit:.1}\u{a0}×\u{a0}10{}", superscript(power as i32))
 }
 
 /// Text with its raised digits as the page raises them, which looks the same in every font.
@@ -100,12 +100,13 @@ mod tests {
             (-11.9, "less than once in seven hundred thousand million tries (7 × 10¹¹)"),
             (-38.5, "less than once in 3 × 10³⁸ tries, a number of 39 digits"),
         ] {
-            assert_eq!(how_often(p_log10), said);
+            assert_eq!(how_often(p_log10).replace('\u{a0}', " "), said);
         }
     }
 
     #[test]
     fn small_probabilities_are_powers_of_ten() {
-        assert_eq!([-0.5, -38.5, -4.0, -3.001].map(probability), ["0.316", "3.2 × 10⁻³⁹", "1.0 × 10⁻⁴", "1.0 × 10⁻³"]);
+        let said = [-0.5, -38.5, -4.0, -3.001].map(|p| probability(p).replace('\u{a0}', " "));
+        assert_eq!(said, ["0.316", "3.2 × 10⁻³⁹", "1.0 × 10⁻⁴", "1.0 × 10⁻³"]);
     }
 }
