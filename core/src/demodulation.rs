@@ -94,8 +94,9 @@ impl Demodulation {
             let on_axis = |axis: usize| {
                 let seen = of_patch[axis * carriers..].iter().take(carriers);
                 let chips = carrier.chips(patch, axis, carriers);
-                let signed =
-                    |(i, (chip, a)): (usize, (f64, &f64))| chip * signs[bit_of_coefficient(i + 1, chip_rate)] * a;
+                let signed = |(i, (chip, a)): (usize, (f64, &f64))| {
+                    chip * signs[bit_of_coefficient(i + 1, chip_rate)] * a
+                };
                 chips.into_iter().zip(seen).enumerate().map(signed).sum::<f64>()
             };
             let deviation = dot(of_patch, of_patch).sqrt();

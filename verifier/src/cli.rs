@@ -8,9 +8,19 @@ use meshmark_core::{
     record::Record,
 };
 use meshmark_verifier::{
-    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::{Comparison, compare, detail::Compared},
-    evidence::{self, Provenance}, html, inputs::Inputs, progress::Progress, reading, registration::Start,
-    report::Report, report_file::{Format, ReportFile}, verify, verify::check_key,
+    Demodulator, Error, ExitCode, Request, Result,
+    candidates::verify_candidates,
+    compare::{Comparison, compare, detail::Compared},
+    evidence::{self, Provenance},
+    html,
+    inputs::Inputs,
+    progress::Progress,
+    reading,
+    registration::Start,
+    report::Report,
+    report_file::{Format, ReportFile},
+    verify,
+    verify::check_key,
 };
 use std::{io::Write, path::PathBuf};
 
@@ -206,7 +216,8 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
 fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
     let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
-    let provenance = file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
+    let provenance =
+        file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
     let mut comparison = compare(&args.reference, &args.marked, layers, args.precision, file.is_some())?;
     let detail = comparison.detail.take(); // a report file has it
     print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });

@@ -100,7 +100,15 @@ mod tests {
     fn a_command_line_can_be_given_to_a_shell_and_does_not_name_its_output() {
         let of = |words: &[&str]| command_line(words.iter().map(|w| w.to_string()));
         assert_eq!(
-            of(&["/opt/meshmark", "verify", "--report", "a.html", "--json", "it's Ä map.gpkg", "--report=b.html"]),
+            of(&[
+                "/opt/meshmark",
+                "verify",
+                "--report",
+                "a.html",
+                "--json",
+                "it's Ä map.gpkg",
+                "--report=b.html"
+            ]),
             r"meshmark verify 'it'\''s Ä map.gpkg' --report report.html"
         );
     }

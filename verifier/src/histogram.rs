@@ -54,6 +54,9 @@ mod tests {
     #[test]
     fn round_numbers_are_one_two_and_five() {
         let round = [0.7, 1.0, 1.1, 20.1, 0.0003, 600.0].map(round_up);
-        assert_eq!(round.map(|v| format!("{v:.4}")), ["1.0000", "1.0000", "2.0000", "50.0000", "0.0005", "1000.0000"]);
+        assert_eq!(
+            round.map(|v| format!("{v:.4}")),
+            ["1.0000", "1.0000", "2.0000", "50.0000", "0.0005", "1000.0000"]
+        );
     }
 }

@@ -62,7 +62,9 @@ impl ReportFile {
         let failed = |error: std::io::Error| {
             let remedy = match error.kind() {
                 ErrorKind::AlreadyExists => ", and a report is never overwritten: name another file",
-                ErrorKind::StorageFull | ErrorKind::QuotaExceeded => ": make room, or name a file on another disk",
+                ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+                    ": make room, or name a file on another disk"
+                }
                 _ => ": name a file in a folder you may write to",
             };
             Error::Usage(format!("the report {} cannot be written: {error}{remedy}", self.path.display()))
@@ -71,7 +73,8 @@ impl ReportFile {
         options.prefix(".meshmark-report-");
         #[cfg(unix)] // less the process's umask, as for any file
         options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = options.tempfile_in(folder(&self.path)).map_err(|error| failed(without_path(error)))?;
+        let mut file =
+            options.tempfile_in(folder(&self.path)).map_err(|error| failed(without_path(error)))?;
         file.write_all(text.as_bytes()).map_err(|error| failed(without_path(error)))?;
         file.as_file().sync_all().map_err(failed)?;
         file.persist_noclobber(&self.path).map_err(|error| failed(error.error))?;

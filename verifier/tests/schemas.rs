@@ -142,7 +142,11 @@ fn report_files_are_valid_whatever_the_verdict() {
         let report = report_file(&[&verify[..], &arguments].concat());
         assert_valid("report", &report);
         assert_eq!(report["seconds"], Value::Null);
-        assert_closed("report", &report, &["/provenance", "/provenance/key", "/evidence", "/evidence/sample"]);
+        assert_closed(
+            "report",
+            &report,
+            &["/provenance", "/provenance/key", "/evidence", "/evidence/sample"],
+        );
     }
 }
 
@@ -150,7 +154,11 @@ fn report_files_are_valid_whatever_the_verdict() {
 fn the_report_file_of_a_comparison_is_valid() {
     let report = report_file(&["compare", "kotka.gpkg", "vectors/marked.gpkg"]);
     assert_valid("compare", &report);
-    assert_closed("compare", &report, &["/detail", "/detail/provenance", "/detail/topology", "/detail/extent"]);
+    assert_closed(
+        "compare",
+        &report,
+        &["/detail", "/detail/provenance", "/detail/topology", "/detail/extent"],
+    );
 }
 
 /// What the command prints of the test vectors.

@@ -185,8 +185,7 @@ impl Pairs {
         let corners = self.corners();
         let angles: Vec<[f64; 2]> = corners.iter().map(|(_, angle)| *angle).collect();
         let ((validity, invalid), (overlaps, overlapping)) = (self.validity(), self.overlaps());
-        let (crossings, crossing) =
-            topology::crossings(&segments, vertices.coords(), &moved, &self.ground);
+        let (crossings, crossing) = topology::crossings(&segments, vertices.coords(), &moved, &self.ground);
         let detail = detailed.then(|| {
             let torn = vertices.coords().iter().zip(&torn).filter(|(_, torn)| **torn);
             Findings {

@@ -218,7 +218,9 @@ mod tests {
 
     #[test]
     fn a_sliver_that_grows_a_little_is_not_new() {
-        let of = |before_m2, after_m2| Overlap { at: [0.0; 2], before_m2, after_m2, sliver_m2: SLIVER_M2 }.is_new();
+        let of = |before_m2, after_m2| {
+            Overlap { at: [0.0; 2], before_m2, after_m2, sliver_m2: SLIVER_M2 }.is_new()
+        };
         assert!(!of(0.997e-6, 1.002e-6));
         assert!(of(0.997e-6, 2.1e-6) && of(0.0, 1.1e-6));
         assert!(!of(0.0, 0.9e-6) && !of(1.0, 2.0));

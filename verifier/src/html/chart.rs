@@ -37,7 +37,8 @@ impl Chart<'_> {
         let bins = self.histogram.counts.iter().enumerate().filter(|(_, count)| **count > 0);
         let mut bars = String::new();
         for (bin, count) in bins {
-            let [left, right] = [bin, bin + 1].map(|b| self.x(self.histogram.from + b as f64 * self.histogram.width));
+            let [left, right] =
+                [bin, bin + 1].map(|b| self.x(self.histogram.from + b as f64 * self.histogram.width));
             let y = self.y(*count as f64);
             let _ = write!(bars, "M{left:.1} {HEIGHT}V{y:.1}H{right:.1}V{HEIGHT}z");
         }

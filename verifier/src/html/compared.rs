@@ -30,10 +30,7 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
     table(&[
         ("Suspect", Some(file(&inputs.suspect, &map(v.suspect, &crs)))),
         ("Reference", Some(file(&inputs.reference, &map(v.reference, reference_crs)))),
-        (
-            "Key",
-            Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } })),
-        ),
+        ("Key", Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } }))),
         ("Record", Some(record(report, inputs.record.as_ref()))),
         ("Recipient", report.parameters.recipient.as_ref().map(|r| html! { b { (printable(r)) } })),
     ])
@@ -59,7 +56,11 @@ pub fn settings(report: &Report) -> Markup {
     let text = |text: String| Some(html! { (text) });
     let chips = format!(
         "{}, {} coefficient{} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
-        if p.code == meshmark_core::code::Code::Ldpc { "as an error-correcting code word (LDPC)" } else { "repeated bits" },
+        if p.code == meshmark_core::code::Code::Ldpc {
+            "as an error-correcting code word (LDPC)"
+        } else {
+            "repeated bits"
+        },
         p.chip_rate,
         if p.chip_rate == 1 { "" } else { "s" },
         p.patch_size,
@@ -68,7 +69,10 @@ pub fn settings(report: &Report) -> Markup {
     let grid = p.precision_crs_units.map(|grid| html! { (grid) " CRS units" });
     let layers = p.layers.as_ref().map(|layers| html! { (printable(&layers.join(", "))) });
     let content = table(&[
-        ("Amplitude", text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m))),
+        (
+            "Amplitude",
+            text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m)),
+        ),
         ("Message", text(chips)),
         ("Shape", text(format!("{} vertices", word(&p.shape)))),
         ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
@@ -89,9 +93,16 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
     html! {
         h3 { "Copies that were tried" }
         p {
-            (count(candidates.tried)) " records of this key and this reference were tried, and every probability counts "
-            (count(candidates.tried)) " times for it."
-            @if candidates.skipped > 0 { " " (count(candidates.skipped)) " other files were left out." }
+            @match candidates.tried {
+                1 => "One record of this key and this reference was tried.",
+                tried => {
+                    (count(tried)) " records of this key and this reference were tried; for that, every probability is \
+                     multiplied by " (count(tried)) "."
+                }
+            }
+            @if candidates.skipped > 0 {
+                " Files of the folder that are no such record and were left out: " (count(candidates.skipped)) "."
+            }
             @if candidates.tried > candidates.list.len() {
                 " The best " (count(candidates.list.len())) " are listed."
             }
@@ -107,7 +118,7 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                         } }
                         td { (printable(&entry.record)) }
                         td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } }
-                        td.number { @if let Some(p) = entry.p_value_log10 { (words::raised(&words::probability(p))) } @else { "–" } }
+                        td.number { @if let Some(p) = entry.p_value_log10 { (words::probability(p)) } @else { "–" } }
                         td { @if number < candidates.matches && entry.p_value_log10.is_some_and(|p| p < significance) { b { "match" } } }
                     }
                 }

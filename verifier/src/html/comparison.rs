@@ -53,7 +53,8 @@ pub fn comparison(comparison: &Comparison) -> String {
 
 fn is_kept(comparison: &Comparison) -> bool {
     let (validity, overlaps, crossings) = (&comparison.validity, &comparison.overlaps, &comparison.crossings);
-    comparison.compared.torn_vertices + validity.newly_invalid + overlaps.new + crossings.new + crossings.lost == 0
+    comparison.compared.torn_vertices + validity.newly_invalid + overlaps.new + crossings.new + crossings.lost
+        == 0
 }
 
 fn sentence(comparison: &Comparison, provenance: Option<&Compared>) -> Markup {
@@ -78,7 +79,8 @@ fn changes(comparison: &Comparison) -> String {
         (c.crossings.new, "new crossings"),
         (c.crossings.lost, "lost crossings"),
     ];
-    let some: Vec<String> = all.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{} {what}", count(*n))).collect();
+    let some: Vec<String> =
+        all.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{} {what}", count(*n))).collect();
     some.join(", ")
 }
 
@@ -101,7 +103,8 @@ fn percent(share: f64, decimals: usize) -> String {
 }
 
 fn files(provenance: &Compared) -> Markup {
-    let file = |file: &crate::inputs::Digested| Some(html! { b { (file.path) } br; span.digest { (file.digest) } });
+    let file =
+        |file: &crate::inputs::Digested| Some(html! { b { (file.path) } br; span.digest { (file.digest) } });
     section(
         "What was compared",
         &html! {
@@ -116,10 +119,28 @@ fn numbers(comparison: &Comparison) -> Markup {
     let (d, h, a, r) = (&c.displacement, &c.hausdorff, &c.angles, &c.areas);
     let text = |text: String| Some(html! { (text) });
     table(&[
-        ("Displacement", text(format!("{:.3} m RMS; 99 % up to {:.3} m, all up to {:.3} m", d.rms_m, d.p99_m, d.max_m))),
-        ("Features", text(format!("99 % within {:.3} m of where they were, all within {:.3} m (Hausdorff distance)", h.p99_m, h.max_m))),
-        ("Angles", text(format!("turn by {:.2}° on average; 99 % by up to {:.2}°", a.mean_change_deg, a.p99_change_deg))),
-        ("Right angles", text(format!("{} of {} kept within 1°", percent(a.right_angles_kept, 1), count(a.right_angles)))),
+        (
+            "Displacement",
+            text(format!("{:.3} m RMS; 99 % up to {:.3} m, all up to {:.3} m", d.rms_m, d.p99_m, d.max_m)),
+        ),
+        (
+            "Features",
+            text(format!(
+                "99 % within {:.3} m of where they were, all within {:.3} m (Hausdorff distance)",
+                h.p99_m, h.max_m
+            )),
+        ),
+        (
+            "Angles",
+            text(format!(
+                "turn by {:.2}° on average; 99 % by up to {:.2}°",
+                a.mean_change_deg, a.p99_change_deg
+            )),
+        ),
+        (
+            "Right angles",
+            text(format!("{} of {} kept within 1°", percent(a.right_angles_kept, 1), count(a.right_angles))),
+        ),
         (
             "Areas",
             text(format!(
@@ -172,11 +193,14 @@ fn maps(detail: &Detail) -> Markup {
 /// Cells by how much their angles turned, and marks where the topology changed.
 fn angles(detail: &Detail, frame: &Frame) -> Markup {
     let t = &detail.topology;
-    let class = |change: f64| CLASSES.iter().rev().find(|(from, ..)| change >= *from).map_or("e0", |(_, class, _)| class);
+    let class = |change: f64| {
+        CLASSES.iter().rev().find(|(from, ..)| change >= *from).map_or("e0", |(_, class, _)| class)
+    };
     let of_class = |wanted: &str| {
         let mut path = String::new();
         for [x, y, _] in detail.angle_cells.iter().filter(|cell| class(cell[2]) == wanted) {
-            let corner = |sign: f64| frame.at([x + sign * detail.cell[0] / 2.0, y + sign * detail.cell[1] / 2.0]);
+            let corner =
+                |sign: f64| frame.at([x + sign * detail.cell[0] / 2.0, y + sign * detail.cell[1] / 2.0]);
             let ([left, bottom], [right, top]) = (corner(-1.0), corner(1.0));
             let _ = write!(path, "M{left} {bottom}H{right}V{top}H{left}z");
         }

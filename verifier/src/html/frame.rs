@@ -21,7 +21,8 @@ pub struct Frame {
 impl Frame {
     pub fn new(extent: &Extent) -> Self {
         let [width_m, height_m] = extent.size_m();
-        let per_metre = SIDE / width_m.max(height_m).max(f64::MIN_POSITIVE);
+        let longer_m = width_m.max(height_m);
+        let per_metre = if longer_m > 0.0 { SIDE / longer_m } else { 1.0 };
         // Narrow maps get room for their scale.
         let width = (width_m * per_metre).max(SIDE / 2.0);
         Frame { extent: *extent, per_metre, width, height: (height_m * per_metre).max(SIDE / 20.0) }
@@ -29,7 +30,8 @@ impl Frame {
 
     /// Where a place is on the page.
     pub fn at(&self, place: [f64; 2]) -> [i64; 2] {
-        let metres = [0, 1].map(|axis| (place[axis] - self.extent.lower[axis]) * self.extent.metres_per_unit[axis]);
+        let metres =
+            [0, 1].map(|axis| (place[axis] - self.extent.lower[axis]) * self.extent.metres_per_unit[axis]);
         [metres[0] * self.per_metre, self.height - metres[1] * self.per_metre].map(|v| v.round() as i64)
     }
 

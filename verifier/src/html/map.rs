@@ -51,7 +51,9 @@ fn patterns() -> Markup {
 }
 
 fn class(score: Option<f64>) -> &'static str {
-    let of = |score| CLASSES.iter().rev().find(|(from, ..)| score >= *from).map_or("against", |(_, class, _)| class);
+    let of = |score| {
+        CLASSES.iter().rev().find(|(from, ..)| score >= *from).map_or("against", |(_, class, _)| class)
+    };
     score.map_or("unseen", of)
 }
 

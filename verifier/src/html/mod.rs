@@ -81,7 +81,8 @@ fn count(number: usize) -> String {
     if number < 10_000 {
         return digits;
     }
-    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().map(|g| std::str::from_utf8(g).expect("digits")).collect();
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().map(|g| std::str::from_utf8(g).expect("digits")).collect();
     groups.join("\u{202f}")
 }
 
@@ -96,6 +97,9 @@ mod tests {
 
     #[test]
     fn long_counts_are_grouped() {
-        assert_eq!([0, 3833, 10_000, 1_234_567].map(count), ["0", "3833", "10\u{202f}000", "1\u{202f}234\u{202f}567"]);
+        assert_eq!(
+            [0, 3833, 10_000, 1_234_567].map(count),
+            ["0", "3833", "10\u{202f}000", "1\u{202f}234\u{202f}567"]
+        );
     }
 }

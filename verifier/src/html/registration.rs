@@ -20,8 +20,8 @@ pub fn registration(report: &Report) -> Markup {
         }
         (table(&[
             ("Landmarks", (r.landmarks > 0).then(|| html! { (count(r.landmarks)) " agree" })),
-            ("Shift", alignment.map(|a| html! { (format!("{:.3} m east, {:.3} m north", a.shift_m[0], a.shift_m[1]).replace('-', "−")) })),
-            ("Turn", alignment.map(|a| html! { (format!("{:.4}°", a.turn_deg).replace('-', "−")) @if a.mirrored { ", mirrored" } })),
+            ("Shift", alignment.map(|a| html! { (signed(a.shift_m[0], 3)) " m in x, " (signed(a.shift_m[1], 3)) " m in y" })),
+            ("Turn", alignment.map(|a| html! { (signed(a.turn_deg, 4)) "°" @if a.mirrored { ", mirrored" } })),
             ("Stretch", alignment.map(|a| html! { (format!("by {:.6}, across by {:.6}", a.stretch[0], a.stretch[1])) })),
             ("Beyond that", r.polynomial.map(|_| html! { "a cubic polynomial" })),
             ("Residual", r.rms_m.map(|rms| html! { (format!("{rms:.3} m RMS of matched vertices")) })),
@@ -31,6 +31,13 @@ pub fn registration(report: &Report) -> Markup {
         @if let Some(evidence) = &report.evidence { (residuals(evidence)) }
     };
     section("How the maps were brought together", &content)
+}
+
+/// With a minus sign, and none before zero.
+fn signed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.chars().all(|c| "-0.".contains(c));
+    if is_zero { text.replace('-', "") } else { text.replace('-', "−") }
 }
 
 fn deformation(evidence: &Evidence) -> Markup {

@@ -42,17 +42,17 @@ fn sentence(report: &Report) -> Markup {
         (map)
         @match (report.verdict, odds) {
             (Verdict::Match, odds) => {
-                " carries the mark of " (mark(report)) ": by chance, " (chance) " "
-                (words::raised(&odds.unwrap_or_default())) "."
+                " carries the mark of " (mark(report))
+                @if let Some(odds) = odds { ": by chance, " (chance) " " (odds) } "."
             }
             (Verdict::NoMatch, odds) => {
                 " does not carry the mark of " (mark(report)) ", which would have shown"
-                @if let Some(odds) = odds { ": by chance, " (chance) " " (words::raised(&odds)) } "."
+                @if let Some(odds) = odds { ": by chance, " (chance) " " (odds) } "."
             }
             (Verdict::Inconclusive, odds) => {
                 " cannot tell whether it carries the mark of " (mark(report)) ": " (printable(&report.reason))
                 @match odds {
-                    Some(odds) => { "; by chance, " (chance) " " (words::raised(&odds)) "." }
+                    Some(odds) => { "; by chance, " (chance) " " (odds) "." }
                     None => { "; so there are no odds to give." }
                 }
             }
@@ -84,13 +84,13 @@ fn figures(report: &Report) -> Markup {
     html! {
         dl.figures {
             @if let Some(p) = report.p_value_log10 {
-                div { dt { "Probability by chance" } dd { (words::raised(&words::probability(p))) } }
+                div { dt { "Probability by chance" } dd { (words::probability(p)) } }
             }
             @if let Some(errors) = report.bit_errors {
                 div { dt { "Message bits that differ" } dd { (count(errors)) " of " (count(report.bits.len())) } }
             }
             div { dt { "Vertices found" } dd { (count(v.matched)) " of " (count(v.reference)) } }
-            div { dt { "Match means below" } dd { (words::raised(&words::probability(report.parameters.significance.log10()))) } }
+            div { dt { "Match means below" } dd { (words::probability(report.parameters.significance.log10())) } }
         }
     }
 }

@@ -38,16 +38,16 @@ impl Grid {
 
     fn snap(&self, coords: &[[f64; 2]], segments: &[[u32; 2]]) -> BTreeSet<[Node; 2]> {
         let node = |v: u32| {
-            [0, 1].map(|axis| {
-                ((coords[v as usize][axis] - self.lower[axis]) / self.step[axis]).round() as u32
-            })
+            [0, 1]
+                .map(|axis| ((coords[v as usize][axis] - self.lower[axis]) / self.step[axis]).round() as u32)
         };
         let ends = segments.iter().map(|s| s.map(node));
         ends.filter(|[a, b]| a != b).map(|[a, b]| [a.min(b), a.max(b)]).collect()
     }
 
     fn places(&self, line: &[Node]) -> Vec<[f64; 2]> {
-        let place = |node: &Node| [0, 1].map(|axis| self.lower[axis] + f64::from(node[axis]) * self.step[axis]);
+        let place =
+            |node: &Node| [0, 1].map(|axis| self.lower[axis] + f64::from(node[axis]) * self.step[axis]);
         line.iter().map(place).collect()
     }
 }

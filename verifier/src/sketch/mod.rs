@@ -3,11 +3,7 @@
 mod lines;
 mod thinning;
 
-use crate::{
-    histogram::Histogram,
-    matching::Matches,
-    registration::Registration,
-};
+use crate::{histogram::Histogram, matching::Matches, registration::Registration};
 use geo::{ConvexHull, MultiPoint};
 use meshmark_core::{
     deformation::Deformation,
@@ -17,7 +13,6 @@ use meshmark_core::{
 };
 use meshmark_dataset::Survey;
 use serde::Serialize;
-use std::collections::BTreeSet;
 
 pub(crate) use lines::lines;
 pub(crate) use thinning::Thinning;
@@ -153,9 +148,9 @@ impl Scene<'_> {
 
     /// Places of the suspect's vertices without a counterpart.
     fn inserted(&self) -> Vec<[f64; 2]> {
-        let taken: BTreeSet<u32> = self.matches.suspect_of.iter().flatten().copied().collect();
-        let free = |(v, _): &(usize, _)| !taken.contains(&(*v as u32));
-        self.moved.iter().enumerate().filter(free).map(|(_, place)| *place).collect()
+        let mut taken = vec![false; self.moved.len()];
+        self.matches.suspect_of.iter().flatten().for_each(|v| taken[*v as usize] = true);
+        self.moved.iter().zip(taken).filter(|(_, taken)| !taken).map(|(place, _)| *place).collect()
     }
 
     fn alignment(&self, registration: &Registration) -> Alignment {
