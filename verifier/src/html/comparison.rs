@@ -209,7 +209,7 @@ fn angles(detail: &Detail, frame: &Frame) -> Markup {
     let drawing = html! {
         svg.map.cells viewBox=(frame.view_box()) role="img" aria-label="Map of the reference, by how much angles turned" {
             @for (_, class, _) in CLASSES { path class=(class) d=(of_class(class)) {} }
-            path #lines d=(frame.path(detail.lines.iter(), false)) {}
+            (frame.lines(&detail.lines))
             @for (class, shape, places, _) in KINDS.map(|(class, shape, places, name)| (class, shape, places(t), name)) {
                 path class=(class) d=(marks(frame, places, shape)) {}
             }

@@ -7,6 +7,8 @@ use std::fmt::Write as _;
 const SIDE: f64 = 4000.0;
 /// Room for the scale under the map.
 const FOOT: f64 = 230.0;
+/// Points of rings and lines from which a map is dark with them.
+const DENSE: usize = 10_000;
 /// White around it.
 const MARGIN: f64 = 30.0;
 
@@ -64,6 +66,12 @@ impl Frame {
             }
         }
         path
+    }
+
+    /// The rings and lines of a map, to be used again as `#lines`; fainter where they would cover what lies under them.
+    pub fn lines(&self, lines: &[Vec<[f64; 2]>]) -> Markup {
+        let points: usize = lines.iter().map(Vec::len).sum();
+        html! { path #lines class=[(points > DENSE).then_some("dense")] d=(self.path(lines.iter(), false)) {} }
     }
 
     /// A scale bar, and beside it what else the foot shows, drawn from (0, 0) to the right.

@@ -67,7 +67,7 @@ fn patches(evidence: &Evidence, frame: &Frame) -> Markup {
                 path class=(if scored { class(score(number)) } else { "plain" })
                     d=(frame.path(std::iter::once(&place.outline), true)) {}
             }
-            path #lines d=(frame.path(evidence.sketch.lines.iter(), false)) {}
+            (frame.lines(&evidence.sketch.lines))
             @if scored && places.len() <= MOST_NUMBERED {
                 @for (number, place) in places.iter().enumerate() {
                     @let [x, y] = frame.at(middle(place));
