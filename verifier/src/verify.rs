@@ -243,7 +243,7 @@ fn demodulate(
     }
     progress.start("deformation", 0);
     let carriers = patches.carriers(bits, parameters)?;
-    let (matches, observed, disturbance) = tracking.follow(carriers, request)?;
+    let Followed { matches, observed, disturbance } = tracking.follow(carriers, request)?;
     scene.matches = matches;
     scene.deformation = Some(disturbance.deformation);
     progress.start("demodulation", steps);
@@ -315,12 +315,16 @@ struct Tracking<'a> {
     graphs: [Graph; 2],
 }
 
+/// What came of it.
+struct Followed {
+    matches: Matches,
+    /// What to demodulate: displacements, their noise shaped.
+    observed: Vec<Option<[f64; 2]>>,
+    disturbance: Prediction,
+}
+
 impl Tracking<'_> {
-    fn follow(
-        &self,
-        carriers: usize,
-        request: &Request,
-    ) -> meshmark_core::Result<(Matches, Vec<Option<[f64; 2]>>, Prediction)> {
+    fn follow(&self, carriers: usize, request: &Request) -> meshmark_core::Result<Followed> {
         let coords = self.reference.vertices.coords();
         let mut matches = self.match_joined(coords, request.radius_m);
         let mut observed = self.displacements(&matches);
@@ -342,7 +346,7 @@ impl Tracking<'_> {
                 }
                 let (shaped, prediction) =
                     prediction.shape_noise(self.patches, &observed, carriers, amplitude_m);
-                return Ok((matches, shaped, prediction));
+                return Ok(Followed { matches, observed: shaped, disturbance: prediction });
             }
             matches = self.match_around(&prediction, request.radius_m);
             observed = self.displacements(&matches);
