@@ -68,12 +68,14 @@ faults: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped, Python, QGIS, the examples, a clean Debian; installs what they need.
+# A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the examples, a clean Debian; installs
+# what they need.
 hosts: build plugin-for-wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
 	host-tests/hosts/qgis.sh
 	host-tests/hosts/qgis_plugin.sh
+	host-tests/hosts/chromium.sh
 	host-tests/hosts/examples.sh
 	host-tests/hosts/deb.sh
 

@@ -428,6 +428,25 @@ mod tests {
     }
 
     #[test]
+    fn every_patch_has_a_score_of_its_own() {
+        let message = Message::from_hex("a5").unwrap();
+        let carrier = Carrier::new(&crate::key::SecretKey::from_bytes([3; 32]));
+        let signs = message.signs();
+        // 8 bits of 2 chips: the first patch carries the mark, the second its opposite, of the third nothing was seen.
+        let patch = |(patch, size): (usize, f64)| {
+            let chips = [0, 1].map(|axis| carrier.chips(patch, axis, 16)).concat();
+            chips.into_iter().enumerate().map(|(i, chip)| size * chip * signs[i % 16 / 2]).collect::<Vec<_>>()
+        };
+        let chip_correlations = [2.0, -1.0, 0.0].into_iter().enumerate().flat_map(patch).collect();
+        let found = Demodulation { chip_correlations, scores: vec![0.0; 8], ..found() };
+        let scores = found.patch_scores(&carrier, &message, 3);
+        assert_eq!(scores[2], None);
+        for (score, expected) in scores.iter().zip([32f64.sqrt(), -(32f64.sqrt())]) {
+            assert!((score.unwrap() - expected).abs() < 1e-12, "{scores:?}");
+        }
+    }
+
+    #[test]
     fn decoys_are_standard_normal_and_the_same_for_the_same_seed() {
         let scores = found().decoy_scores(10_000, [5; 32]);
         assert_eq!(scores[..10], found().decoy_scores(10, [5; 32]));

@@ -77,7 +77,7 @@ pub struct AngleChange {
 impl AngleChange {
     /// Of angles before and after, degrees from 0 to 360.
     pub fn of(angles: &[[f64; 2]]) -> Self {
-        let change = |[before, after]: &[f64; 2]| (after - before).abs().min(360.0 - (after - before).abs());
+        let change = |angle: &[f64; 2]| angle_change_deg(*angle);
         let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
         let right: Vec<&[f64; 2]> = angles.iter().filter(|[before, _]| is_right(*before)).collect();
         let kept = right.iter().filter(|angle| change(angle) <= RIGHT_DEG).count();
@@ -107,6 +107,11 @@ impl AngleChange {
         };
         Self::of(&corners.par_iter().filter_map(angles).collect::<Vec<_>>())
     }
+}
+
+/// How far an angle turned, from 0 to 180.
+pub fn angle_change_deg([before, after]: [f64; 2]) -> f64 {
+    (after - before).abs().min(360.0 - (after - before).abs())
 }
 
 /// The angle from the way back to the way on, turning left, degrees from 0 to 360; `scale` is metres per unit.

@@ -106,6 +106,8 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         demodulator: Demodulator::Joint,
         radius_m: 1.0,
         significance: 1e-6,
+        sketch: false,
+        evidence_map: false,
     };
     let mut progress = Progress::default();
     let map = verify::read_reference(&request, &mut progress)?;

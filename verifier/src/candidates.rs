@@ -27,8 +27,9 @@ pub struct Candidates {
     pub skipped: usize,
     /// The best, the most significant first.
     pub list: Vec<Entry>,
+    /// How many of them match.
     #[serde(skip)]
-    matches: usize,
+    pub(crate) matches: usize,
 }
 
 /// One of them.
@@ -67,7 +68,7 @@ impl Candidates {
 }
 
 impl Entry {
-    fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let whose = match &self.recipient {
             Some(recipient) => printable(recipient),
             None => format!("message {}", self.message),

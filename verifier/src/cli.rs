@@ -9,8 +9,19 @@ use meshmark_core::{
     record::Record,
 };
 use meshmark_verifier::{
-    Demodulator, Error, ExitCode, Request, Result, candidates::verify_candidates, compare::compare,
-    evidence_map::Target, explain::Inputs, progress::Progress, reading, registration::Start, verify,
+    Demodulator, Error, ExitCode, Request, Result,
+    candidates::verify_candidates,
+    compare::{Comparison, compare, detail::Compared},
+    evidence::{self, Provenance},
+    evidence_map::Target,
+    html,
+    inputs::Inputs,
+    progress::Progress,
+    reading,
+    registration::Start,
+    report::Report,
+    report_file::{Format, ReportFile},
+    verify,
     verify::check_key,
 };
 use std::{
@@ -38,9 +49,7 @@ enum Subcommands {
         key_file: PathBuf,
     },
     /// Say whether a suspect map carries a mark
-    ///
-    /// Exit codes: 0 match, 1 no match, 2 usage, 3 inconclusive, 4 the record does not belong to this
-    /// reference or key, 5 unreadable input, 6 too large.
+    #[command(long_about = about_verify())]
     Verify(Box<VerifyArgs>),
     /// Say what marking did to a map: displacement, angles, areas, topology
     ///
@@ -70,6 +79,9 @@ struct CompareArgs {
     /// Print the comparison as one JSON object
     #[arg(long)]
     json: bool,
+    /// Write a report to read and print (.html), or to process (.json); the file must not exist
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -113,6 +125,9 @@ struct VerifyArgs {
     /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with their scores
     #[arg(long, value_name = "FILE")]
     evidence_map: Option<PathBuf>,
+    /// Write a report to read and print (.html), or to process (.json); the file must not exist
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     marking: MarkingFlags,
 }
@@ -167,6 +182,11 @@ fn probability(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+fn about_verify() -> String {
+    let codes = ExitCode::ALL.map(|code| format!("{} {}", code as u8, code.meaning())).join(", ");
+    format!("Say whether a suspect map carries a mark\n\nExit codes: {codes}.")
+}
+
 /// Runs the command of this process.
 pub fn run() -> ExitCode {
     reading::quieten_gdal();
@@ -217,30 +237,62 @@ fn write_package_files(folder: &Path) -> Result<ExitCode> {
 
 fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
     let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
-    let comparison = compare(&args.reference, &args.marked, layers, args.precision)?;
+    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
+    let provenance =
+        file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
+    let mut comparison = compare(&args.reference, &args.marked, layers, args.precision, file.is_some())?;
+    let detail = comparison.detail.take(); // a report file has it
     print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
+    if let Some((file, mut detail)) = file.zip(detail) {
+        detail.provenance = provenance;
+        let comparison = Comparison { detail: Some(detail), ..comparison };
+        file.write(&match file.format() {
+            Format::Html => html::comparison(&comparison),
+            Format::Json => comparison.to_json(),
+        })?;
+    }
     Ok(ExitCode::Match)
 }
 
 fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
-    let inputs = args.explain.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
-    let (json, records, record) = (args.json, args.records.clone(), args.record.clone());
+    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(Target::new).transpose()?;
+    let wanted = args.explain || file.is_some();
+    let inputs = wanted.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
+    let (json, explain) = (args.json, args.explain);
+    let (records, record) = (args.records.clone(), args.record.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut warn = |text: &str| eprintln!("meshmark: {text}");
-    let report = match &records {
+    let mut report = match &records {
         Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
         None => verify(&request, &mut progress)?,
     };
-    if let Some(target) = evidence_map {
-        report.evidence_map.write(&target)?;
+    if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
+        map.write(&target)?;
     }
+    let evidence = report.evidence.take(); // a report file has it
     print!("{}", if json { report.to_json() } else { report.to_text() });
-    if let Some(inputs) = inputs {
-        print!("\n{}", inputs.explain(&report, record.as_deref(), records.as_deref())?);
+    let Some(inputs) = inputs else { return Ok(report.exit_code()) };
+    let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
+    let inputs = inputs.with_record(record.or_else(best).as_deref())?;
+    if explain {
+        print!("\n{}", inputs.explain(&report));
+    }
+    if let Some(file) = file {
+        let provenance = Provenance::new(&report, inputs, command_line());
+        let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
+        file.write(&match file.format() {
+            Format::Html => html::verification(&report),
+            Format::Json => report.to_json(),
+        })?;
     }
     Ok(report.exit_code())
+}
+
+/// That of this process.
+fn command_line() -> String {
+    evidence::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }
 
 /// Puts key, record and flags together.
@@ -277,6 +329,8 @@ fn request(args: VerifyArgs) -> Result<Request> {
         demodulator: args.demodulator,
         radius_m: args.radius,
         significance: args.significance,
+        sketch: args.report.is_some(),
+        evidence_map: args.evidence_map.is_some(),
     })
 }
 

@@ -1,11 +1,13 @@
 //! Decoys: how keys that do not exist score on the same suspect. The p-values rest on the analytic null;
 //! this shows that it holds here.
 
+use crate::histogram::Histogram;
 use meshmark_core::{demodulation::Demodulation, vertices::VertexTable};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 const COUNT: usize = 1000;
+const BINS: usize = 20;
 
 /// Scores of decoy keys, in standard deviations of the null hypothesis.
 #[derive(Debug, Clone, Serialize)]
@@ -21,6 +23,8 @@ pub struct Decoys {
     pub standard_deviation: f64,
     /// The largest score.
     pub largest: f64,
+    /// How often each score occurs.
+    pub histogram: Histogram,
     /// The score of the key and message in question; null when no message was expected.
     pub tested: Option<f64>,
 }
@@ -42,6 +46,7 @@ impl Decoys {
             mean,
             standard_deviation: variance.sqrt(),
             largest: scores.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            histogram: Histogram::of(&scores, BINS)?,
             tested: None,
         })
     }

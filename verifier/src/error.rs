@@ -35,6 +35,32 @@ pub enum ExitCode {
     TooLarge = 6,
 }
 
+impl ExitCode {
+    /// All of them.
+    pub const ALL: [ExitCode; 7] = [
+        ExitCode::Match,
+        ExitCode::NoMatch,
+        ExitCode::Usage,
+        ExitCode::Inconclusive,
+        ExitCode::DoesNotBelong,
+        ExitCode::Unreadable,
+        ExitCode::TooLarge,
+    ];
+
+    /// What it means to `meshmark verify`.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            ExitCode::Match => "match",
+            ExitCode::NoMatch => "no match",
+            ExitCode::Usage => "usage",
+            ExitCode::Inconclusive => "inconclusive",
+            ExitCode::DoesNotBelong => "the record does not belong to this reference or key",
+            ExitCode::Unreadable => "unreadable input",
+            ExitCode::TooLarge => "too large",
+        }
+    }
+}
+
 impl Error {
     /// The exit code of this error.
     pub fn exit_code(&self) -> ExitCode {

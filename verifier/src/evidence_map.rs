@@ -1,25 +1,17 @@
 //! What a verdict rests on, as a map: where the vertices were found, and what each patch says.
 
-use crate::{Error, Result, verify::Request};
+use crate::{Error, Result, sketch::Scene, verify::Request};
 use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
 };
-use meshmark_core::{carrier::Carrier, demodulation::Demodulation, ground::Ground, patches::Patches};
-use meshmark_dataset::{CoordinateSystem, Survey};
+use meshmark_core::{carrier::Carrier, demodulation::Demodulation, patches::Patch};
+use meshmark_dataset::CoordinateSystem;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Equal evidence makes equal bytes: a GeoPackage holds the time of its last change.
 const NO_TIME: &str = "1970-01-01T00:00:00.000Z";
-
-/// The displacements that were demodulated, of every reference vertex.
-pub struct Followed {
-    /// Metres on the ground; `None` where the vertex was not found.
-    pub observed: Vec<Option<[f64; 2]>>,
-    /// 1, or less where the displacement does not fit in with the others.
-    pub weights: Vec<f64>,
-}
 
 /// A reference vertex that was found.
 #[derive(Debug, Clone, Copy)]
@@ -56,47 +48,37 @@ pub struct EvidenceMap {
     pub vertices: Vec<FoundVertex>,
     /// All patches, whether anything of them was found or not.
     pub patches: Vec<PatchEvidence>,
-    /// Place and patch of every reference vertex, until the vertices are added.
-    places: Vec<([f64; 2], usize)>,
-    ground: Ground,
 }
 
 impl EvidenceMap {
-    /// Before anything was found.
-    pub fn new(reference: &Survey, ground: Ground, patches: &Patches) -> Self {
-        let coords = reference.vertices.coords();
-        let mut places: Vec<([f64; 2], usize)> = coords.iter().map(|at| (*at, 0)).collect();
-        for (number, patch) in patches.as_slice().iter().enumerate() {
-            patch.vertices.iter().for_each(|&v| places[v as usize].1 = number);
+    /// Of what was demodulated: without that, the patches alone.
+    pub fn new(scene: &Scene) -> Self {
+        let coords = scene.reference.vertices.coords();
+        let mut patch_of = vec![0; coords.len()];
+        for (number, patch) in scene.patches.as_slice().iter().enumerate() {
+            patch.vertices.iter().for_each(|&v| patch_of[v as usize] = number);
         }
-        let of_patch = |patch: &meshmark_core::patches::Patch| PatchEvidence {
+        let of_patch = |patch: &Patch| PatchEvidence {
             vertices: patch.vertices.iter().map(|&v| coords[v as usize]).collect(),
             found: 0,
             score: None,
         };
-        let patches = patches.as_slice().iter().map(of_patch).collect();
-        EvidenceMap { crs: reference.crs.clone(), vertices: Vec::new(), patches, places, ground }
-    }
-
-    /// Adds the vertices that were found and says how many they are.
-    pub fn add_vertices(&mut self, followed: &Followed) -> usize {
-        for ((moved_m, weight), (at, patch)) in
-            followed.observed.iter().zip(&followed.weights).zip(&self.places)
-        {
-            let Some(moved_m) = *moved_m else { continue };
-            let unit = self.ground.metres_per_unit(*at);
+        let patches = scene.patches.as_slice().iter().map(of_patch).collect();
+        let mut map = EvidenceMap { crs: scene.reference.crs.clone(), vertices: Vec::new(), patches };
+        let moved_m = scene.matches.displacements_m(coords, scene.moved, scene.ground);
+        for (v, &weight) in scene.weights.iter().flatten().enumerate() {
+            let (Some(moved_m), at) = (moved_m[v], coords[v]) else { continue };
+            let unit = scene.ground.metres_per_unit(at);
             let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];
-            self.vertices.push(FoundVertex { at: *at, to, patch: *patch, moved_m, weight: *weight });
-            self.patches[*patch].found += 1;
+            map.vertices.push(FoundVertex { at, to, patch: patch_of[v], moved_m, weight });
+            map.patches[patch_of[v]].found += 1;
         }
-        self.vertices.len()
+        map
     }
 
     /// The same with the score of every patch for the message that is expected.
     pub fn scored(&self, request: &Request, found: Option<&Demodulation>) -> Self {
-        let (vertices, patches) = (self.vertices.clone(), self.patches.clone());
-        let mut scored =
-            EvidenceMap { crs: self.crs.clone(), vertices, patches, places: Vec::new(), ground: self.ground };
+        let mut scored = self.clone();
         if let Some((found, message)) = found.zip(request.expected.as_ref()) {
             let carrier = Carrier::new(&request.key);
             let scores = found.patch_scores(&carrier, message, self.patches.len());

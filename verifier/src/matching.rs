@@ -43,6 +43,28 @@ pub struct Matches {
     pub count: usize,
 }
 
+impl Matches {
+    /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches. `moved` are the
+    /// suspect's vertices in reference coordinates.
+    pub fn displacements_m(
+        &self,
+        reference: &[[f64; 2]],
+        moved: &[[f64; 2]],
+        ground: &Ground,
+    ) -> Vec<Option<[f64; 2]>> {
+        let pairs = reference.iter().zip(&self.suspect_of);
+        pairs.map(|(r, s)| s.map(|s| ground.metres_between(*r, moved[s as usize]))).collect()
+    }
+
+    /// Drops the matches of other reference vertices.
+    pub fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+        for (vertex, suspect) in self.suspect_of.iter_mut().enumerate() {
+            *suspect = suspect.filter(|_| wanted(vertex));
+        }
+        self.count = self.suspect_of.iter().flatten().count();
+    }
+}
+
 impl<'a> Matcher<'a> {
     /// `reference`: vertices in CRS units; `centre`: the middle of the map.
     pub fn new(reference: &'a [[f64; 2]], ground: &'a Ground, centre: [f64; 2]) -> Self {

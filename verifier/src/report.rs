@@ -5,6 +5,7 @@ use crate::{
     decision::{Decision, Verdict, p_any_message_log10},
     decoys::Decoys,
     error::ExitCode,
+    evidence::{Evidence, Provenance},
     evidence_map::EvidenceMap,
     registration::Registration,
     verify::{Demodulator, Examination, Request},
@@ -52,8 +53,12 @@ pub struct Report {
     pub vertices: VertexCounts,
     /// What was assumed of the mark and how it was tested.
     pub parameters: ReportParameters,
-    /// Seconds by stage.
-    pub seconds: BTreeMap<&'static str, f64>,
+    /// Seconds by stage; null in a report file, which is the same for the same input.
+    pub seconds: Option<BTreeMap<&'static str, f64>>,
+    /// What was compared and how to do it again; null but in a report file.
+    pub provenance: Option<Provenance>,
+    /// Where on the map the evidence is; null but in a report file.
+    pub evidence: Option<Evidence>,
     /// Digest of the vertices of the reference.
     #[serde(skip)]
     pub reference_digest: String,
@@ -62,7 +67,7 @@ pub struct Report {
     pub suspect_crs: Vec<String>,
     /// Where the vertices were found, and what each patch says.
     #[serde(skip)]
-    pub evidence_map: EvidenceMap,
+    pub evidence_map: Option<EvidenceMap>,
 }
 
 /// How the message was decoded.
@@ -147,10 +152,12 @@ impl Report {
             registration: seen.registration.clone(),
             vertices: seen.vertices,
             parameters: ReportParameters::new(request, seen),
-            seconds: seconds.clone(),
+            seconds: Some(seconds.clone()),
+            provenance: None,
+            evidence: Evidence::new(request, seen),
             reference_digest: seen.reference_digest.clone(),
             suspect_crs: seen.suspect_crs.clone(),
-            evidence_map: seen.evidence_map.scored(request, found),
+            evidence_map: seen.evidence_map.as_ref().map(|map| map.scored(request, found)),
         }
     }
 
@@ -227,7 +234,7 @@ impl Report {
     }
 
     /// Whether what was decoded is a mark rather than noise.
-    fn shows_mark(&self) -> bool {
+    pub(crate) fn shows_mark(&self) -> bool {
         self.verdict == Verdict::Match || self.shows_key()
     }
 
@@ -294,7 +301,7 @@ pub fn printable(text: &str) -> String {
 }
 
 /// How sure the bits are, from their log-likelihood ratios.
-fn certainty(bits: &[f64]) -> String {
+pub(crate) fn certainty(bits: &[f64]) -> String {
     let mut sure: Vec<f64> = bits.iter().map(|llr| llr.abs()).collect();
     sure.sort_by(f64::total_cmp);
     let beyond = sure.iter().filter(|llr| **llr > 1000f64.ln()).count();

@@ -5,13 +5,14 @@ use crate::{
     crs_search::{self, Registered, side},
     decision::{Decision, decide},
     decoys::Decoys,
-    evidence_map::{EvidenceMap, Followed},
+    evidence_map::EvidenceMap,
     joined::Graph,
     matching::{Matcher, Matches},
     progress::Progress,
     reading::{self, Reading},
     registration::{LEAST_MATCHED, OUT_OF_PLACE, Registrar, Registration, Start, TIMES_CHANCE},
     report::{Report, VertexCounts},
+    sketch::{Scene, Sketch},
 };
 use meshmark_core::{
     carrier::Carrier,
@@ -69,6 +70,10 @@ pub struct Request {
     pub radius_m: f64,
     /// p-values below this are a match.
     pub significance: f64,
+    /// Whether to keep what a report file draws.
+    pub sketch: bool,
+    /// Whether to keep what a GIS draws.
+    pub evidence_map: bool,
 }
 
 impl Request {
@@ -96,8 +101,10 @@ pub struct Examination {
     pub found: std::result::Result<Demodulation, String>,
     /// How decoy keys score.
     pub decoys: Option<Decoys>,
-    /// Where the vertices were found.
-    pub evidence_map: EvidenceMap,
+    /// What a report file draws, when that was asked for.
+    pub sketch: Option<Sketch>,
+    /// What a GIS draws, when that was asked for.
+    pub evidence_map: Option<EvidenceMap>,
 }
 
 /// Verifies one suspect.
@@ -171,17 +178,30 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         suspect_crs,
         found: Err(unregistered(&vertices, chance, start)),
         decoys: None,
-        evidence_map: EvidenceMap::new(reference, ground, &patches),
+        sketch: None,
+        evidence_map: None,
     };
-    if matches.count >= LEAST_MATCHED && matches.count >= TIMES_CHANCE * chance {
+    let mut scene = Scene {
+        reference,
+        suspect: &suspect,
+        moved: &moved,
+        ground: &ground,
+        patches: &patches,
+        matches,
+        deformation: None,
+        weights: None,
+    };
+    if scene.matches.count >= LEAST_MATCHED && scene.matches.count >= TIMES_CHANCE * chance {
         let graphs = [reference, &suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
         let tracking = Tracking { reference, moved: &moved, ground: &ground, patches: &patches, graphs };
-        let found = demodulate(request, &tracking, &matches, progress);
-        let (found, followed) = found.map_err(|error| of_reference(request, error))?;
-        seen.vertices.matched = seen.evidence_map.add_vertices(&followed);
+        let found = demodulate(request, &tracking, &mut scene, progress);
+        let found = found.map_err(|error| of_reference(request, error))?;
+        seen.vertices.matched = scene.matches.count;
         seen.decoys = Decoys::new(&found, &suspect.vertices, &reference.vertices);
         seen.found = Ok(found);
     }
+    seen.sketch = request.sketch.then(|| scene.sketch(&seen.registration));
+    seen.evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene));
     Ok(seen)
 }
 
@@ -214,29 +234,32 @@ fn unregistered(vertices: &VertexCounts, chance: usize, start: Start) -> String 
     )
 }
 
-/// The paper's demodulator takes the matches as they are; the joint one follows a deformation first.
+/// The paper's demodulator takes the matches as they are; the joint one follows a deformation first, which changes
+/// the matches of the scene.
 fn demodulate(
     request: &Request,
     tracking: &Tracking,
-    matches: &Matches,
+    scene: &mut Scene,
     progress: &mut Progress,
-) -> meshmark_core::Result<(Demodulation, Followed)> {
+) -> meshmark_core::Result<Demodulation> {
     let (bits, parameters, patches) = (request.bits, &request.parameters, tracking.patches);
     let (carrier, steps) = (Carrier::new(&request.key), patches.as_slice().len() as u64);
     if request.demodulator == Demodulator::Paper {
         progress.start("demodulation", steps);
-        let observed = tracking.displacements(matches);
-        let found = demodulation::paper(patches, &carrier, &observed, bits, parameters, &progress.stepper())?;
-        return Ok((found, Followed { weights: vec![1.0; observed.len()], observed }));
+        let matched = tracking.displacements(&scene.matches);
+        scene.weights = Some(vec![1.0; matched.len()]);
+        return demodulation::paper(patches, &carrier, &matched, bits, parameters, &progress.stepper());
     }
     progress.start("deformation", 0);
     let carriers = patches.carriers(bits, parameters)?;
-    let (observed, prediction) = tracking.follow(carriers, request)?;
-    let (shaped, disturbance) = prediction.shape_noise(patches, &observed, carriers, parameters.amplitude_m);
+    let Followed { matches, observed, disturbance } = tracking.follow(carriers, request)?;
+    scene.matches = matches;
+    scene.deformation = Some(disturbance.deformation);
     progress.start("demodulation", steps);
     let step = progress.stepper();
-    let found = demodulation::joint(patches, &carrier, &shaped, bits, parameters, &disturbance, &step)?;
-    Ok((found, Followed { observed, weights: disturbance.weights }))
+    let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
+    scene.weights = Some(disturbance.weights);
+    Ok(found)
 }
 
 /// The record must be of this key, and its message what key and recipient give.
@@ -304,14 +327,19 @@ struct Tracking<'a> {
     graphs: [Graph; 2],
 }
 
+/// What came of it.
+struct Followed {
+    matches: Matches,
+    /// What to demodulate: displacements, their noise shaped.
+    observed: Vec<Option<[f64; 2]>>,
+    disturbance: Prediction,
+}
+
 impl Tracking<'_> {
-    fn follow(
-        &self,
-        carriers: usize,
-        request: &Request,
-    ) -> meshmark_core::Result<(Vec<Option<[f64; 2]>>, Prediction)> {
+    fn follow(&self, carriers: usize, request: &Request) -> meshmark_core::Result<Followed> {
         let coords = self.reference.vertices.coords();
-        let mut observed = self.displacements(&self.match_joined(coords, request.radius_m));
+        let mut matches = self.match_joined(coords, request.radius_m);
+        let mut observed = self.displacements(&matches);
         let amplitude_m = request.parameters.amplitude_m;
         let mark_m = mark_deviation_m(self.patches, carriers, amplitude_m);
         let fit = |observed: &Observed| {
@@ -325,11 +353,15 @@ impl Tracking<'_> {
                 let kept = prediction.without_outliers(&observed, mark_m);
                 if kept != observed {
                     prediction = fit(&kept)?;
+                    matches.keep(|vertex| kept[vertex].is_some());
                     observed = kept;
                 }
-                return Ok((observed, prediction));
+                let (shaped, prediction) =
+                    prediction.shape_noise(self.patches, &observed, carriers, amplitude_m);
+                return Ok(Followed { matches, observed: shaped, disturbance: prediction });
             }
-            observed = self.displacements(&self.match_around(&prediction, request.radius_m));
+            matches = self.match_around(&prediction, request.radius_m);
+            observed = self.displacements(&matches);
             round += 1;
         }
     }
@@ -352,7 +384,6 @@ impl Tracking<'_> {
 
     /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
     fn displacements(&self, matches: &Matches) -> Vec<Option<[f64; 2]>> {
-        let pairs = self.reference.vertices.coords().iter().zip(&matches.suspect_of);
-        pairs.map(|(r, s)| s.map(|s| self.ground.metres_between(*r, self.moved[s as usize]))).collect()
+        matches.displacements_m(self.reference.vertices.coords(), self.moved, self.ground)
     }
 }

@@ -117,6 +117,50 @@ fn the_record_that_the_driver_wrote_is_valid() {
     assert_valid("record", &serde_json::from_str(&text).unwrap());
 }
 
+/// What `--report` writes, run in the fixtures.
+fn report_file(arguments: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("report.json");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));
+    command.current_dir(root().join("fixtures")).args(arguments).arg("--report").arg(&path);
+    command.output().unwrap();
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn report_files_are_valid_whatever_the_verdict() {
+    let verify = ["verify", "--key", "vectors/key.json", "--reference", "kotka.gpkg"];
+    let record = ["--record", "vectors/record.json"];
+    for arguments in [
+        vec![record[0], record[1], "vectors/marked.gpkg"],
+        vec![record[0], record[1], "--demodulator", "paper", "vectors/marked.gpkg"],
+        vec![record[0], record[1], "kotka.gpkg"],
+        vec![record[0], record[1], "helsinki.gpkg"],
+        vec!["--records", "vectors", "vectors/marked.gpkg"],
+        vec!["--layers", "buildings,landuse,roads", "--precision", "0.001", "vectors/marked.gpkg"],
+    ] {
+        let report = report_file(&[&verify[..], &arguments].concat());
+        assert_valid("report", &report);
+        assert_eq!(report["seconds"], Value::Null);
+        assert_closed(
+            "report",
+            &report,
+            &["/provenance", "/provenance/key", "/evidence", "/evidence/sample"],
+        );
+    }
+}
+
+#[test]
+fn the_report_file_of_a_comparison_is_valid() {
+    let report = report_file(&["compare", "kotka.gpkg", "vectors/marked.gpkg"]);
+    assert_valid("compare", &report);
+    assert_closed(
+        "compare",
+        &report,
+        &["/detail", "/detail/provenance", "/detail/topology", "/detail/extent"],
+    );
+}
+
 /// What the command prints of the test vectors.
 fn comparison() -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));

@@ -3,11 +3,13 @@
 //! Features correspond by their order within a layer, vertices by their order within a feature: the driver changes
 //! neither. Lengths, angles and areas are those on the ground.
 
+pub mod detail;
 mod shape;
 mod text;
 mod topology;
 
 use crate::{Error, Result, reading};
+use detail::{Detail, Findings};
 use meshmark_core::{
     distortion::{AngleChange, Displacement},
     ground::Ground,
@@ -38,6 +40,8 @@ pub struct Comparison {
     pub overlaps: Overlaps,
     /// Segments that cross.
     pub crossings: Crossings,
+    /// Where on the map all that is; null but in a report file.
+    pub detail: Option<Detail>,
 }
 
 /// Counts.
@@ -125,7 +129,7 @@ pub(crate) struct Pair {
     pub after: FeatureGeometry,
 }
 
-/// Compares two files. `precision` is the grid of the marked one, CRS units: overlaps up to a cell of it are slivers.
+/// Compares two files, and keeps where they differ when `detailed`. `precision` is the grid of the marked one, CRS units: overlaps up to a cell of it are slivers.
 ///
 /// # Errors
 /// Unreadable input, a reference without a CRS, or maps whose features do not correspond.
@@ -134,6 +138,7 @@ pub fn compare(
     marked: &Path,
     layers: Option<&[String]>,
     precision: Option<f64>,
+    detailed: bool,
 ) -> Result<Comparison> {
     let ground = reading::ground(reference, layers)?;
     let before = reading::geometries("reference", reference, layers)?;
@@ -146,7 +151,7 @@ pub fn compare(
         )));
     }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
-    Ok(Pairs { features, ground, grid: precision.unwrap_or(0.0) }.compare())
+    Ok(Pairs { features, ground, grid: precision.unwrap_or(0.0) }.compare(detailed))
 }
 
 fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
@@ -163,7 +168,7 @@ fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
 }
 
 impl Pairs {
-    fn compare(&self) -> Comparison {
+    fn compare(&self, detailed: bool) -> Comparison {
         let all = |map: fn(&Pair) -> &FeatureGeometry| {
             self.features.iter().flat_map(move |pair| map(pair).chains.iter().flatten().copied())
         };
@@ -176,6 +181,23 @@ impl Pairs {
             torn[index as usize] |= *place != to;
         }
         let moved: Vec<[f64; 2]> = moved.into_iter().map(|to| to.expect("every vertex occurs")).collect();
+        let segments = self.segments(&indices);
+        let corners = self.corners();
+        let angles: Vec<[f64; 2]> = corners.iter().map(|(_, angle)| *angle).collect();
+        let ((validity, invalid), (overlaps, overlapping)) = (self.validity(), self.overlaps());
+        let (crossings, crossing) = topology::crossings(&segments, vertices.coords(), &moved, &self.ground);
+        let detail = detailed.then(|| {
+            let torn = vertices.coords().iter().zip(&torn).filter(|(_, torn)| **torn);
+            Findings {
+                vertices: &vertices,
+                moved: &moved,
+                ground: &self.ground,
+                segments: &segments,
+                corners: &corners,
+                places: [torn.map(|(at, _)| *at).collect(), invalid, overlapping, crossing],
+            }
+            .detail()
+        });
         Comparison {
             meshmark_comparison: 1,
             compared: Compared {
@@ -185,11 +207,12 @@ impl Pairs {
             },
             displacement: Displacement::between(&vertices, &moved, &self.ground),
             hausdorff: self.hausdorff(),
-            angles: self.angles(),
+            angles: AngleChange::of(&angles),
             areas: self.areas(),
-            validity: self.validity(),
-            overlaps: self.overlaps(),
-            crossings: topology::crossings(&self.segments(&indices), vertices.coords(), &moved, &self.ground),
+            validity,
+            overlaps,
+            crossings,
+            detail,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Areas, Hausdorff, Pair, Pairs};
 use gdal::vector::Geometry;
-use meshmark_core::distortion::{AngleChange, Spread, angle_deg};
+use meshmark_core::distortion::{Spread, angle_deg};
 use meshmark_dataset::FeatureGeometry;
 use rayon::prelude::*;
 use rstar::{PointDistance, RTree, primitives::Line};
@@ -18,15 +18,15 @@ impl Pairs {
         Hausdorff { p99_m: spread.p99, max_m: spread.max }
     }
 
-    pub(super) fn angles(&self) -> AngleChange {
+    /// Of every corner where it is and its angle before and after, degrees.
+    pub(super) fn corners(&self) -> Vec<([f64; 2], [f64; 2])> {
         let each = |pair: &Pair| {
             let scale = self.scale(&pair.before);
             let chains = pair.before.chains.iter().zip(&pair.after.chains);
             chains.flat_map(|(a, b)| corners(a, scale).into_iter().zip(corners(b, scale))).collect::<Vec<_>>()
         };
         let all = self.features.iter().flat_map(each);
-        let all: Vec<[f64; 2]> = all.filter_map(|(before, after)| Some([before?, after?])).collect();
-        AngleChange::of(&all)
+        all.filter_map(|((at, before), (_, after))| Some((at, [before?, after?]))).collect()
     }
 
     pub(super) fn areas(&self) -> Areas {
@@ -46,13 +46,13 @@ fn area(feature: &FeatureGeometry) -> f64 {
     Geometry::from_wkb(&feature.wkb).map_or(0.0, |geometry| geometry.area())
 }
 
-/// The angles of a chain, degrees from 0 to 360, turning left from the way back to the way on; that of the first
+/// The places and angles of the corners of a chain, degrees from 0 to 360, turning left from the way back to the way on; that of the first
 /// vertex of a ring, too. None where a segment has no length.
-fn corners(chain: &[[f64; 2]], scale: [f64; 2]) -> Vec<Option<f64>> {
+fn corners(chain: &[[f64; 2]], scale: [f64; 2]) -> Vec<([f64; 2], Option<f64>)> {
     let is_ring = chain.len() > 3 && chain.first() == chain.last();
     let closing = if is_ring { Some([chain[chain.len() - 2], chain[0], chain[1]]) } else { None };
     let inner = chain.windows(3).map(|w| [w[0], w[1], w[2]]);
-    inner.chain(closing).map(|[from, at, to]| angle_deg(from, at, to, scale)).collect()
+    inner.chain(closing).map(|[from, at, to]| (at, angle_deg(from, at, to, scale))).collect()
 }
 
 /// A feature as segments (points as segments of no length), metres.

@@ -26,19 +26,22 @@ fn is_valid(feature: &FeatureGeometry) -> bool {
 }
 
 impl Pairs {
-    pub(super) fn validity(&self) -> Validity {
+    /// Also where geometries became invalid.
+    pub(super) fn validity(&self) -> (Validity, Vec<[f64; 2]>) {
         let each = |pair: &Pair| [is_valid(&pair.before), is_valid(&pair.after)];
         let valid: Vec<[bool; 2]> = self.features.par_iter().map(each).collect();
         let count = |wanted: fn(&[bool; 2]) -> bool| valid.iter().filter(|v| wanted(v)).count();
-        Validity {
+        let counts = Validity {
             invalid_before: count(|v| !v[0]),
             invalid_after: count(|v| !v[1]),
             newly_invalid: count(|v| v[0] && !v[1]),
-        }
+        };
+        let new = self.features.iter().zip(&valid).filter(|(_, v)| v[0] && !v[1]);
+        (counts, new.filter_map(|(pair, _)| pair.before.chains.first()?.first().copied()).collect())
     }
 
-    /// Overlaps among polygons that are valid in both maps; GEOS has no answer for others.
-    pub(super) fn overlaps(&self) -> Overlaps {
+    /// Overlaps among polygons that are valid in both maps, for GEOS has no answer for others, and where new ones are.
+    pub(super) fn overlaps(&self) -> (Overlaps, Vec<[f64; 2]>) {
         let polygons = self.polygons();
         let tree = RTree::bulk_load(polygons.clone());
         let of_polygon = |polygon: &Polygon| -> Vec<Overlap> {
@@ -50,13 +53,14 @@ impl Pairs {
         };
         let all: Vec<Overlap> = polygons.par_iter().flat_map_iter(of_polygon).collect();
         let new: Vec<&Overlap> = all.iter().filter(|overlap| overlap.is_new()).collect();
-        Overlaps {
+        let counts = Overlaps {
             before: all.iter().filter(|o| o.is_more(o.before_m2)).count(),
             after: all.iter().filter(|o| o.is_more(o.after_m2)).count(),
             new: new.len(),
             new_area_m2: new.iter().fold(0.0, |sum, o| sum + o.after_m2 - o.before_m2),
             new_slivers: all.iter().filter(|o| o.before_m2 == 0.0 && o.is_sliver(o.after_m2)).count(),
-        }
+        };
+        (counts, new.iter().map(|overlap| overlap.at).collect())
     }
 
     fn polygons(&self) -> Vec<Polygon> {
@@ -89,7 +93,8 @@ impl Pairs {
         let each = |other: &u32| {
             let other = &self.features[*other as usize];
             let (before_m2, after_m2) = (common(&before, &other.before), common(&after, &other.after));
-            Overlap { before_m2, after_m2, sliver_m2 }
+            let at = other.before.chains.first().and_then(|chain| chain.first()).copied().unwrap_or_default();
+            Overlap { at, before_m2, after_m2, sliver_m2 }
         };
         others.iter().map(each).collect()
     }
@@ -97,6 +102,8 @@ impl Pairs {
 
 /// The area that two polygons have in common, square metres.
 struct Overlap {
+    /// A vertex of the second one.
+    at: [f64; 2],
     before_m2: f64,
     after_m2: f64,
     /// Up to this, it is rounding.
@@ -121,24 +128,28 @@ impl Overlap {
 type Polygon = GeomWithData<Rectangle<[f64; 2]>, u32>;
 type Segment = GeomWithData<Rectangle<[f64; 2]>, u32>;
 
-/// Counts pairs of segments that cross before and after.
+/// Counts pairs of segments that cross before and after, and says where one of the two did not or does no longer.
 pub(super) fn crossings(
     segments: &[[u32; 2]],
     before: &[[f64; 2]],
     after: &[[f64; 2]],
     ground: &Ground,
-) -> Crossings {
+) -> (Crossings, Vec<[f64; 2]>) {
     let (old, new) = (crossing_pairs(segments, before), crossing_pairs(segments, after));
     let is_deep = |[i, j]: &[u32; 2], coords: &[[f64; 2]]| {
         let ends = [*i, *j].map(|s| segments[s as usize].map(|v| coords[v as usize]));
         depth_m(ends, ground) > GRAZE_M
     };
-    Crossings {
+    let counts = Crossings {
         before: old.iter().filter(|pair| is_deep(pair, before)).count(),
         after: new.iter().filter(|pair| is_deep(pair, after)).count(),
         new: new.difference(&old).filter(|pair| is_deep(pair, after)).count(),
         lost: old.difference(&new).filter(|pair| is_deep(pair, before)).count(),
-    }
+    };
+    let changed = new.difference(&old).filter(|pair| is_deep(pair, after));
+    let changed = changed.chain(old.difference(&new).filter(|pair| is_deep(pair, before)));
+    let places = changed.map(|[segment, _]| before[segments[*segment as usize][0] as usize]);
+    (counts, places.collect())
 }
 
 fn crossing_pairs(segments: &[[u32; 2]], coords: &[[f64; 2]]) -> BTreeSet<[u32; 2]> {
@@ -197,7 +208,7 @@ mod tests {
         };
         let overlaps = |grid: f64| {
             let features = vec![pair([0.0, 1.0], [0.0, 1.005]), pair([1.0, 2.0], [1.0, 2.0])];
-            Pairs { features, ground: Ground::Plane { metres_per_unit: 1.0 }, grid }.overlaps()
+            Pairs { features, ground: Ground::Plane { metres_per_unit: 1.0 }, grid }.overlaps().0
         };
         assert_eq!((overlaps(0.0).new, overlaps(0.0).new_slivers), (1, 0));
         assert!((overlaps(0.0).new_area_m2 - 0.005).abs() < 1e-9);
@@ -207,7 +218,9 @@ mod tests {
 
     #[test]
     fn a_sliver_that_grows_a_little_is_not_new() {
-        let of = |before_m2, after_m2| Overlap { before_m2, after_m2, sliver_m2: SLIVER_M2 }.is_new();
+        let of = |before_m2, after_m2| {
+            Overlap { at: [0.0; 2], before_m2, after_m2, sliver_m2: SLIVER_M2 }.is_new()
+        };
         assert!(!of(0.997e-6, 1.002e-6));
         assert!(of(0.997e-6, 2.1e-6) && of(0.0, 1.1e-6));
         assert!(!of(0.0, 0.9e-6) && !of(1.0, 2.0));

@@ -1,0 +1,133 @@
+//! Where on the map a comparison found what: what its report draws, thinned to what a page can show.
+
+use crate::{
+    Result,
+    histogram::Histogram,
+    inputs::{Digested, digest},
+    sketch::{ARROWS, BINS, Extent, Thinning, lines},
+};
+use meshmark_core::{distortion::angle_change_deg, ground::Ground, vertices::VertexTable};
+use serde::Serialize;
+use std::{collections::BTreeMap, path::Path};
+
+/// Angles that turned less than this did not change to speak of, degrees.
+pub const NOTABLE_DEG: f64 = 1.0;
+/// Cells of the map of angles along its longer side.
+const CELLS: usize = 60;
+/// Places of topology that are drawn; more would only cover each other.
+const MOST_PLACES: usize = 2000;
+
+/// Where on the map what differs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Detail {
+    /// The files; null until they are given.
+    pub provenance: Option<Compared>,
+    /// Where the reference is.
+    pub extent: Extent,
+    /// How far vertices are from where they were, metres; null without vertices.
+    pub displacement_m: Option<Histogram>,
+    /// How far angles turned, degrees; null without angles.
+    pub angle_change_deg: Option<Histogram>,
+    /// Some of the vertices: x and y, CRS units, displacement in x and y, metres.
+    pub moved: Vec<[f64; 4]>,
+    /// Cells in which an angle turned by 1° or more: x and y of their middle, CRS units, and the largest change, degrees.
+    pub angle_cells: Vec<[f64; 3]>,
+    /// Width and height of a cell, CRS units.
+    pub cell: [f64; 2],
+    /// Where the topology changed.
+    pub topology: Topology,
+    /// Rings and lines of the reference, thinned, CRS units.
+    #[serde(skip)]
+    pub lines: Vec<Vec<[f64; 2]>>,
+}
+
+/// Places, CRS units, at most 2000 of each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Topology {
+    /// Vertices that were torn apart.
+    pub torn: Vec<[f64; 2]>,
+    /// Geometries that became invalid.
+    pub invalid: Vec<[f64; 2]>,
+    /// Polygons that overlap now.
+    pub overlaps: Vec<[f64; 2]>,
+    /// Segments that cross now, or no longer.
+    pub crossings: Vec<[f64; 2]>,
+}
+
+/// The files of a comparison, and how to compare them again.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// The reference.
+    pub reference: Digested,
+    /// The marked map.
+    pub marked: Digested,
+    /// The command line.
+    pub command: String,
+    /// Programs and libraries that the result rests on, with their versions.
+    pub versions: Vec<String>,
+}
+
+impl Compared {
+    /// Digests the files.
+    ///
+    /// # Errors
+    /// One of them cannot be read to its end.
+    pub fn read(reference: &Path, marked: &Path, command: String) -> Result<Self> {
+        let versions = crate::evidence::versions();
+        Ok(Compared { reference: digest(reference)?, marked: digest(marked)?, command, versions })
+    }
+}
+
+/// What was compared, vertex by vertex.
+pub(super) struct Findings<'a> {
+    pub vertices: &'a VertexTable,
+    pub moved: &'a [[f64; 2]],
+    pub ground: &'a Ground,
+    pub segments: &'a [[u32; 2]],
+    /// Places, and angles before and after.
+    pub corners: &'a [([f64; 2], [f64; 2])],
+    /// Of torn vertices, new invalid geometries, new overlaps, changed crossings.
+    pub places: [Vec<[f64; 2]>; 4],
+}
+
+impl Findings<'_> {
+    pub fn detail(self) -> Detail {
+        let (coords, extent) = (self.vertices.coords(), Extent::of(self.vertices, self.ground));
+        let pairs = coords.iter().zip(self.moved);
+        let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.ground.metres_between(*a, *b)).collect();
+        let lengths: Vec<f64> = displacements.iter().map(|[x, y]| x.hypot(*y)).collect();
+        let changes: Vec<f64> = self.corners.iter().map(|(_, angle)| angle_change_deg(*angle)).collect();
+        let mut arrows = Thinning::new(&extent, ARROWS);
+        let shown = coords.iter().zip(&displacements).filter(|(at, _)| arrows.takes(**at));
+        let grid = Thinning::new(&extent, CELLS);
+        let [torn, invalid, overlaps, crossings] = self.places.map(|mut places| {
+            places.truncate(MOST_PLACES);
+            places
+        });
+        Detail {
+            provenance: None,
+            extent,
+            displacement_m: Histogram::of(&lengths, BINS),
+            angle_change_deg: Histogram::of(&changes, BINS),
+            moved: shown.map(|(at, d)| [at[0], at[1], d[0], d[1]]).collect(),
+            angle_cells: cells(&grid, self.corners, &changes),
+            cell: grid.cell(),
+            topology: Topology { torn, invalid, overlaps, crossings },
+            lines: lines(&extent, coords, self.segments),
+        }
+    }
+}
+
+/// The largest change of every cell that has a notable one.
+fn cells(grid: &Thinning, corners: &[([f64; 2], [f64; 2])], changes: &[f64]) -> Vec<[f64; 3]> {
+    let mut largest: BTreeMap<[u32; 2], f64> = BTreeMap::new();
+    for ((at, _), change) in corners.iter().zip(changes).filter(|(_, change)| **change >= NOTABLE_DEG) {
+        let cell = largest.entry(grid.cell_of(*at)).or_default();
+        *cell = cell.max(*change);
+    }
+    let place = |(cell, change): (&[u32; 2], &f64)| {
+        let [x, y] = grid.middle_of(*cell);
+        [x, y, *change]
+    };
+    largest.iter().map(place).collect()
+}

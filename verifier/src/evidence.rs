@@ -1,0 +1,117 @@
+//! What a report file holds beyond the answer.
+
+use crate::{
+    inputs::Inputs,
+    report::Report,
+    sketch::Sketch,
+    verify::{Examination, Request},
+};
+use meshmark_core::carrier::Carrier;
+use serde::Serialize;
+
+/// Where on the map the evidence is.
+#[derive(Debug, Clone, Serialize)]
+pub struct Evidence {
+    /// The map, thinned.
+    #[serde(flatten)]
+    pub sketch: Sketch,
+    /// Of every patch, how many standard deviations its evidence for the message is above that of a random key; null
+    /// where nothing was observed. Empty when nothing was decoded or no message was expected.
+    pub patch_scores: Vec<Option<f64>>,
+}
+
+/// What was compared, and how to do it again.
+#[derive(Debug, Clone, Serialize)]
+pub struct Provenance {
+    /// The files.
+    #[serde(flatten)]
+    pub inputs: Inputs,
+    /// Digest of the vertices of the reference.
+    pub reference_vertices_sha256: String,
+    /// CRS of the suspect's layers.
+    pub suspect_crs: Vec<String>,
+    /// The command line.
+    pub command: String,
+    /// Programs and libraries that the result rests on, with their versions.
+    pub versions: Vec<String>,
+}
+
+impl Evidence {
+    pub(crate) fn new(request: &Request, seen: &Examination) -> Option<Self> {
+        let sketch = seen.sketch.clone()?;
+        let tested = seen.found.as_ref().ok().zip(request.expected.as_ref());
+        let scores = |(found, message): (&meshmark_core::demodulation::Demodulation, _)| {
+            found.patch_scores(&Carrier::new(&request.key), message, sketch.patches.len())
+        };
+        let patch_scores = tested.map(scores).unwrap_or_default();
+        Some(Evidence { sketch, patch_scores })
+    }
+}
+
+impl Provenance {
+    /// `command` as the user gave it.
+    pub fn new(report: &Report, inputs: Inputs, command: String) -> Self {
+        Provenance {
+            inputs,
+            reference_vertices_sha256: report.reference_digest.clone(),
+            suspect_crs: report.suspect_crs.clone(),
+            command,
+            versions: versions(),
+        }
+    }
+}
+
+/// This program, and the library that reads the maps.
+pub(crate) fn versions() -> Vec<String> {
+    let gdal = gdal::version::VersionInfo::release_name();
+    vec![format!("meshmark {}", env!("CARGO_PKG_VERSION")), format!("GDAL {gdal}")]
+}
+
+/// A command line without what only says where its output goes, and the report as `report.html`.
+pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
+    let mut words = vec!["meshmark".to_string()];
+    let mut arguments = arguments.skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--report" | "--evidence-map" => drop(arguments.next()),
+            "--json" | "--explain" => {}
+            word if word.starts_with("--report=") || word.starts_with("--evidence-map=") => {}
+            word => words.push(quoted(word)),
+        }
+    }
+    words.extend(["--report".into(), "report.html".into()]);
+    words.join(" ")
+}
+
+/// For a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_line_can_be_given_to_a_shell_and_does_not_name_its_output() {
+        let of = |words: &[&str]| command_line(words.iter().map(|w| w.to_string()));
+        assert_eq!(
+            of(&[
+                "/opt/meshmark",
+                "verify",
+                "--report",
+                "a.html",
+                "--evidence-map",
+                "a.gpkg",
+                "--json",
+                "it's Ä map.gpkg",
+                "--report=b.html"
+            ]),
+            r"meshmark verify 'it'\''s Ä map.gpkg' --report report.html"
+        );
+    }
+}

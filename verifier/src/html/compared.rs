@@ -1,0 +1,128 @@
+//! What was compared, with what identifies it, and the records that were tried.
+
+use super::{count, section, table, words};
+use crate::{
+    candidates::Candidates,
+    evidence::Provenance,
+    explain,
+    inputs::Digested,
+    report::{Report, printable},
+};
+use maud::{Markup, html};
+
+pub fn compared(report: &Report) -> Markup {
+    let content = html! {
+        @if let Some(provenance) = &report.provenance { (files(report, provenance)) }
+        p { @for text in explain::bound(report) { (super::sentence(&text)) } }
+        @if let Some(candidates) = &report.candidates { (tried(report, candidates)) }
+    };
+    section("What was compared", &content)
+}
+
+fn files(report: &Report, provenance: &Provenance) -> Markup {
+    let (inputs, v) = (&provenance.inputs, &report.vertices);
+    let crs = match provenance.suspect_crs.as_slice() {
+        [] => "no layer".into(),
+        crs => crs.join(", "),
+    };
+    let map = |vertices: usize, crs: &str| html! { (count(vertices)) " vertices, " (crs) };
+    let reference_crs = report.parameters.crs.as_deref().unwrap_or("no CRS");
+    table(&[
+        ("Suspect", Some(file(&inputs.suspect, &map(v.suspect, &crs)))),
+        ("Reference", Some(file(&inputs.reference, &map(v.reference, reference_crs)))),
+        ("Key", Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } }))),
+        ("Record", Some(record(report, inputs.record.as_ref()))),
+        ("Recipient", report.parameters.recipient.as_ref().map(|r| html! { b { (printable(r)) } })),
+    ])
+}
+
+fn file(file: &Digested, about: &Markup) -> Markup {
+    html! { b { (file.path) } br; (about) br; span.digest { (file.digest) } }
+}
+
+fn record(report: &Report, record: Option<&Digested>) -> Markup {
+    html! {
+        @match (record, &report.candidates) {
+            (Some(record), None) => (file(record, &html! { "of this key and this reference" })),
+            (Some(record), Some(_)) => (file(record, &html! { "the best of those that were tried" })),
+            (None, _) => "none: how the map was marked was taken from the command line",
+        }
+    }
+}
+
+/// How the mark was assumed to be made, and how it was tested.
+pub fn settings(report: &Report) -> Markup {
+    let p = &report.parameters;
+    let text = |text: String| Some(html! { (text) });
+    let chips = format!(
+        "{}, {} coefficient{} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
+        if p.code == meshmark_core::code::Code::Ldpc {
+            "as an error-correcting code word (LDPC)"
+        } else {
+            "repeated bits"
+        },
+        p.chip_rate,
+        if p.chip_rate == 1 { "" } else { "s" },
+        p.patch_size,
+        word(&p.basis)
+    );
+    let grid = p.precision_crs_units.map(|grid| html! { (grid) " CRS units" });
+    let layers = p.layers.as_ref().map(|layers| html! { (printable(&layers.join(", "))) });
+    let content = table(&[
+        (
+            "Amplitude",
+            text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m)),
+        ),
+        ("Message", text(chips)),
+        ("Shape", text(format!("{} vertices", word(&p.shape)))),
+        ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
+        ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
+        ("Matching radius", text(format!("{} m", p.radius_m))),
+        ("Demodulator", text(p.demodulator.into())),
+    ]);
+    section("How the mark was assumed to be made and tested", &content)
+}
+
+/// The word that the JSON has.
+fn word(value: &impl serde::Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|v| v.as_str().map(String::from)).unwrap_or_default()
+}
+
+fn tried(report: &Report, candidates: &Candidates) -> Markup {
+    let significance = report.parameters.significance.log10();
+    html! {
+        h3 { "Copies that were tried" }
+        p {
+            @match candidates.tried {
+                1 => "One record of this key and this reference was tried.",
+                tried => {
+                    (count(tried)) " records of this key and this reference were tried; for that, every probability is \
+                     multiplied by " (count(tried)) "."
+                }
+            }
+            @if candidates.skipped > 0 {
+                " Files of the folder that are no such record and were left out: " (count(candidates.skipped)) "."
+            }
+            @if candidates.tried > candidates.list.len() {
+                " The best " (count(candidates.list.len())) " are listed."
+            }
+        }
+        table.list {
+            thead { tr { th { "Recipient" } th { "Record" } th.number { "Bits that differ" } th.number { "Probability" } th { "" } } }
+            tbody {
+                @for (number, entry) in candidates.list.iter().enumerate() {
+                    tr {
+                        td { @match &entry.recipient {
+                            Some(recipient) => (printable(recipient)),
+                            None => code { (entry.message) },
+                        } }
+                        td { (printable(&entry.record)) }
+                        td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } }
+                        td.number { @if let Some(p) = entry.p_value_log10 { (words::probability(p)) } @else { "–" } }
+                        td { @if number < candidates.matches && entry.p_value_log10.is_some_and(|p| p < significance) { b { "match" } } }
+                    }
+                }
+            }
+        }
+    }
+}

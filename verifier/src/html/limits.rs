@@ -1,0 +1,89 @@
+//! What the finding does not say, what would weaken it, what makes it evidence, and how to repeat it.
+
+use super::{count, section};
+use crate::{decision::Verdict, explain, report::Report};
+use maud::{Markup, html};
+
+pub fn limits(report: &Report) -> Markup {
+    html! {
+        (section("What was not tested", &list(&explain::NOT_TESTED.map(String::from))))
+        (section("What would weaken this finding", &list(&weaknesses(report))))
+        @if let Some(provenance) = &report.provenance {
+            @let deposit = provenance.inputs.deposit(report, provenance.inputs.record.as_ref());
+            (section("What makes this evidence", &html! {
+                p { (deposit[0]) " " (deposit[1]) }
+                ul { @for text in &deposit[2..] { li.digest { (text) } } }
+            }))
+            (section("How to repeat it", &html! {
+                p { "With the files above in their places:" }
+                pre { code { (provenance.command) } }
+                p { "Made with " (provenance.versions.join(", ")) ". Equal files and versions give an equal report, byte by byte." }
+            }))
+        }
+    }
+}
+
+fn list(sentences: &[String]) -> Markup {
+    html! { ul { @for text in sentences { li { (text) } } } }
+}
+
+/// From two to five standard errors, so that honest reports hardly ever show it.
+const STANDARD_ERRORS: f64 = 5.0;
+
+fn weaknesses(report: &Report) -> Vec<String> {
+    let mut found = seen(report);
+    found.extend(
+        [
+            "The probability is that of such a fit without the mark. It is not the probability that the recipient is \
+             innocent: that also depends on who else had the copy, and on everything else that is known.",
+            "Whoever held the key and the reference could have made this mark. If they could have, and nothing was deposited \
+             before the copy was handed out, the finding says only that the map was marked with this key.",
+            "If other keys, references, records or options were tried before, and are not counted here, the probability is \
+             to be multiplied by how many they were.",
+        ]
+        .map(String::from),
+    );
+    if report.verdict == Verdict::NoMatch {
+        found.push(
+            "Another key, another reference or other options than those above may have been used: the finding is about this \
+             mark alone."
+                .into(),
+        );
+    }
+    found
+}
+
+/// What this very report shows.
+fn seen(report: &Report) -> Vec<String> {
+    let mut found = Vec::new();
+    let v = &report.vertices;
+    if 10 * v.matched < v.reference {
+        found.push(format!(
+            "Only {} of {} vertices of the reference were found: the finding rests on a small part of the map.",
+            count(v.matched),
+            count(v.reference)
+        ));
+    }
+    if let Some(decoys) = &report.decoys {
+        let error = 1.0 / (decoys.count as f64).sqrt();
+        let mean_off = decoys.mean.abs() > STANDARD_ERRORS * error;
+        if mean_off || (decoys.standard_deviation - 1.0).abs() > STANDARD_ERRORS * error {
+            found.push(
+                "The decoys do not follow the law that the probabilities rest on: do not rely on the probabilities.".into(),
+            );
+        }
+    }
+    if let Some(errors) = report.bit_errors.filter(|errors| *errors > 0 && report.verdict == Verdict::Match) {
+        found.push(format!("{errors} bits of the message were read wrong, so the mark is worn."));
+    }
+    if let Some(evidence) = &report.evidence {
+        let against = evidence.patch_scores.iter().flatten().filter(|score| **score < -3.0).count();
+        if against > 0 {
+            found.push(format!(
+                "{against} patches speak clearly against the mark (3 standard deviations or more): parts of the suspect may \
+                 come from elsewhere."
+            ));
+        }
+    }
+    found
+}

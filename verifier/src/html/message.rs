@@ -1,0 +1,95 @@
+//! The message bit by bit, with how sure each bit is.
+
+use super::{count, figure, section, sentence};
+use crate::report::{Report, certainty};
+use maud::{Markup, html};
+
+/// Bits in a row.
+const ROW: usize = 16;
+
+/// From which odds a bit is of a class.
+const CLASSES: [(f64, &str, &str); 4] = [
+    (0.0, "s0", "a guess: less than 3 to 1"),
+    (3.0, "s1", "3 to 1 or better"),
+    (30.0, "s2", "30 to 1 or better"),
+    (1000.0, "s3", "1000 to 1 or better"),
+];
+
+pub fn message(report: &Report) -> Markup {
+    let content = match &report.message {
+        None => html! { p { "Nothing was demodulated, so there is no message to show." } },
+        Some(message) => decoded(report, message),
+    };
+    section("The message, bit by bit", &content)
+}
+
+fn decoded(report: &Report, message: &str) -> Markup {
+    let expected = report.parameters.expected_message.as_deref();
+    html! {
+        p {
+            "The suspect was read as " code { (message) }
+            @match (report.bit_errors, expected) {
+                (Some(0), _) => { ", the expected message to the last bit. " }
+                (Some(errors), Some(expected)) => {
+                    ", which differs from the expected " code { (expected) } " in " (count(errors)) " of "
+                    (count(report.bits.len())) " bits. "
+                }
+                _ => { "; no message was expected. " }
+            }
+            @if let Some(how) = report.decoding() { (sentence(&format!("How it was decoded: {how}."))) }
+            @match report.shows_mark() {
+                true => { "Bits: " (certainty(&report.bits)) "." }
+                false => { "No mark of this key shows, so these bits are no better than guessed: noise, too, reads as some message." }
+            }
+        }
+        (figure(&bits(report, message, expected), &legend(report)))
+    }
+}
+
+fn bits(report: &Report, message: &str, expected: Option<&str>) -> Markup {
+    let expected: Option<Vec<bool>> = expected.map(bits_of);
+    let read = bits_of(message);
+    let rows = report.bits.chunks(ROW).enumerate();
+    html! {
+        table.bits {
+            caption.hidden { "Bits of the message, " (ROW) " in a row" }
+            @for (row, llrs) in rows {
+                tr {
+                    th scope="row" { (row * ROW) }
+                    @for (column, llr) in llrs.iter().enumerate() {
+                        @let bit = row * ROW + column;
+                        @let wrong = expected.as_ref().is_some_and(|e| e[bit] != read[bit]);
+                        td class=(format!("{}{}", class(*llr), if wrong { " wrong" } else { "" })) {
+                            (if read[bit] { "1" } else { "0" })
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn class(llr: f64) -> &'static str {
+    let odds = llr.abs().min(700.0).exp();
+    CLASSES.iter().rev().find(|(from, ..)| odds >= *from).map_or("s0", |(_, class, _)| class)
+}
+
+fn legend(report: &Report) -> Markup {
+    html! {
+        b { "Bits of the message. " }
+        "First bit first; the darker, the surer. "
+        @if !report.shows_mark() { "These odds suppose a mark, which does not show. " }
+        ul.legend {
+            @for (_, class, text) in CLASSES { li { span.bit.(class) { "1" } (text) } }
+            @if report.bit_errors.is_some_and(|errors| errors > 0) {
+                li { span.bit.s1.wrong { "1" } "differs from the expected message" }
+            }
+        }
+    }
+}
+
+/// Of hexadecimal digits, the first bit of the first digit first.
+fn bits_of(hex: &str) -> Vec<bool> {
+    let digits = hex.chars().map(|c| c.to_digit(16).unwrap_or_default());
+    digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).collect()
+}

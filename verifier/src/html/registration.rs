@@ -1,0 +1,65 @@
+//! How the suspect was brought onto the reference, and what was left.
+
+use super::{chart::Chart, count, figure, section, sentence, table};
+use crate::{evidence::Evidence, explain, report::Report};
+use maud::{Markup, html};
+
+pub fn registration(report: &Report) -> Markup {
+    let r = &report.registration;
+    let method = match r.method {
+        "identity" => "from where it lay",
+        "landmarks" => "by features with the same attribute values",
+        _ => "by features of the same shape",
+    };
+    let alignment = report.evidence.as_ref().map(|e| &e.sketch.alignment);
+    let content = html! {
+        p {
+            @for text in explain::assumed(report) { (sentence(&text)) }
+            "The suspect was brought onto the reference " (method) ", without the key. What is left between matched vertices \
+             is the mark, and whatever else moved them."
+        }
+        (table(&[
+            ("Landmarks", (r.landmarks > 0).then(|| html! { (count(r.landmarks)) " agree" })),
+            ("Shift", alignment.map(|a| html! { (signed(a.shift_m[0], 3)) " m in x, " (signed(a.shift_m[1], 3)) " m in y" })),
+            ("Turn", alignment.map(|a| html! { (signed(a.turn_deg, 4)) "°" @if a.mirrored { ", mirrored" } })),
+            ("Stretch", alignment.map(|a| html! { (format!("by {:.6}, across by {:.6}", a.stretch[0], a.stretch[1])) })),
+            ("Beyond that", r.polynomial.map(|_| html! { "a cubic polynomial" })),
+            ("Residual", r.rms_m.map(|rms| html! { (format!("{rms:.3} m RMS of matched vertices")) })),
+            ("Deformation", report.evidence.as_ref().map(deformation)),
+            ("Noise", report.parameters.noise_m.map(|noise| html! { (format!("{noise:.3} m per axis, neither mark nor deformation")) })),
+        ]))
+        @if let Some(evidence) = &report.evidence { (residuals(evidence)) }
+    };
+    section("How the maps were brought together", &content)
+}
+
+/// With a minus sign, and none before zero.
+fn signed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.chars().all(|c| "-0.".contains(c));
+    if is_zero { text.replace('-', "") } else { text.replace('-', "−") }
+}
+
+fn deformation(evidence: &Evidence) -> Markup {
+    html! {
+        @match &evidence.sketch.deformation {
+            None => "not estimated",
+            Some(d) if d.deviation_m == 0.0 => "none found",
+            Some(d) => (format!(
+                "smooth, {} m (standard deviation), changing over some {} m; taken into account",
+                d.deviation_m, d.range_m
+            )),
+        }
+    }
+}
+
+fn residuals(evidence: &Evidence) -> Markup {
+    let Some(histogram) = &evidence.sketch.displacement_m else { return html! {} };
+    let to = histogram.from + histogram.width * histogram.counts.len() as f64;
+    let chart = Chart { histogram, from: 0.0, to, label: "displacement of matched vertices, metres" };
+    let caption = html! {
+        b { "Residuals. " }
+        "How far matched vertices are from their places in the reference, after registration."
+    };
+    figure(&chart.draw(&html! {}), &caption)
+}

@@ -1,0 +1,112 @@
+//! A report as a file: HTML to read or JSON to process, written whole or not at all, and never over another.
+
+use crate::{Error, Result};
+use std::{
+    io::{ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+/// Where a report goes.
+pub struct ReportFile {
+    path: PathBuf,
+    format: Format,
+}
+
+/// What it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// For people.
+    Html,
+    /// For programs.
+    Json,
+}
+
+impl ReportFile {
+    /// Checks, before anything is compared, that the file could be written.
+    ///
+    /// # Errors
+    /// Another extension than html and json, a file that exists, a folder that does not.
+    pub fn new(path: &Path) -> Result<Self> {
+        let refused = |reason: &str| Err(Error::Usage(format!("the report {} {reason}", path.display())));
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let format = match extension.as_deref() {
+            Some("html" | "htm") => Format::Html,
+            Some("json") => Format::Json,
+            _ => return refused("ends neither in .html nor in .json: name a file that does"),
+        };
+        if path.symlink_metadata().is_ok() {
+            return refused("exists, and a report is never overwritten: name another file");
+        }
+        if !folder(path).is_dir() {
+            let folder = folder(path).display();
+            return refused(&format!("cannot be written: {folder} is no folder, make it first"));
+        }
+        Ok(ReportFile { path: path.into(), format })
+    }
+
+    /// What it is.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// The disk, the permissions of the folder, or a file that came into being meanwhile.
+    pub fn write(&self, text: &str) -> Result<()> {
+        let failed = |error: std::io::Error| {
+            let remedy = match error.kind() {
+                ErrorKind::AlreadyExists => ", and a report is never overwritten: name another file",
+                ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+                    ": make room, or name a file on another disk"
+                }
+                _ => ": name a file in a folder you may write to",
+            };
+            Error::Usage(format!("the report {} cannot be written: {error}{remedy}", self.path.display()))
+        };
+        let mut options = tempfile::Builder::new();
+        options.prefix(".meshmark-report-");
+        #[cfg(unix)] // less the process's umask, as for any file
+        options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut file =
+            options.tempfile_in(folder(&self.path)).map_err(|error| failed(without_path(error)))?;
+        file.write_all(text.as_bytes()).map_err(|error| failed(without_path(error)))?;
+        file.as_file().sync_all().map_err(failed)?;
+        file.persist_noclobber(&self.path).map_err(|error| failed(error.error))?;
+        Ok(())
+    }
+}
+
+/// The name of the temporary file helps nobody.
+fn without_path(error: std::io::Error) -> std::io::Error {
+    error.kind().into()
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_is_written_once_and_never_over_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("Bericht für ACME.HTML");
+        let file = ReportFile::new(&path).unwrap();
+        assert_eq!(file.format(), Format::Html);
+        file.write("one").unwrap();
+        assert!(file.write("two").is_err() && ReportFile::new(&path).is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "one");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary is left");
+    }
+}

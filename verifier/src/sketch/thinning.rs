@@ -1,0 +1,44 @@
+//! One point for every cell of a grid: a map of a million vertices becomes one that a page can show.
+
+use super::Extent;
+use std::collections::BTreeSet;
+
+/// Takes the first point of every cell.
+pub(crate) struct Thinning {
+    lower: [f64; 2],
+    upper: [f64; 2],
+    /// CRS units.
+    cell: [f64; 2],
+    taken: BTreeSet<[u32; 2]>,
+}
+
+impl Thinning {
+    /// `cells` along the longer side, squares on the ground.
+    pub fn new(extent: &Extent, cells: usize) -> Self {
+        let [width, height] = extent.size_m();
+        let side_m = (width.max(height) / cells as f64).max(f64::MIN_POSITIVE);
+        let cell = extent.metres_per_unit.map(|metres| side_m / metres);
+        Thinning { lower: extent.lower, upper: extent.upper, cell, taken: BTreeSet::new() }
+    }
+
+    /// Whether the point is the first of its cell; never outside of the extent.
+    pub fn takes(&mut self, point: [f64; 2]) -> bool {
+        let inside = |axis: usize| (self.lower[axis]..=self.upper[axis]).contains(&point[axis]);
+        inside(0) && inside(1) && self.taken.insert(self.cell_of(point))
+    }
+
+    /// The cell of a point inside.
+    pub fn cell_of(&self, point: [f64; 2]) -> [u32; 2] {
+        [0, 1].map(|axis| ((point[axis] - self.lower[axis]) / self.cell[axis]) as u32)
+    }
+
+    /// Its middle.
+    pub fn middle_of(&self, cell: [u32; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| self.lower[axis] + (f64::from(cell[axis]) + 0.5) * self.cell[axis])
+    }
+
+    /// Width and height of a cell, CRS units.
+    pub fn cell(&self) -> [f64; 2] {
+        self.cell
+    }
+}
