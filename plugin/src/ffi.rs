@@ -5,11 +5,12 @@ use crate::{
     error::{Error, Result},
     ffi_errors::{Collector, guarded, report, silence_panics},
     ffi_source::{Borrowed, OwnedSource, strings, text},
-    marking::{Marking, NotMoved, Request, Source, split_options},
+    marking::{Marking, Request, Source, split_options},
     source_files::{is_being_read, save_copies},
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
+use meshmark_dataset::marking::NotMoved;
 use std::{
     ffi::{CString, c_char},
     path::Path,
@@ -123,7 +124,7 @@ unsafe extern "C" fn meshmark_move(
     guarded(-1, || {
         // SAFETY: the shim gives a marking that it holds and a buffer of `size` bytes.
         let (marking, wkb) = unsafe { (&*marking, slice::from_raw_parts_mut(wkb, size)) };
-        let error = match marking.move_geometry(wkb) {
+        let error = match marking.moves().geometry(wkb) {
             Ok(count) => return count as i64,
             Err(error) => error,
         };
