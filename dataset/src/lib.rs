@@ -15,6 +15,7 @@ pub mod publication;
 pub mod read_back;
 mod shapes;
 mod survey;
+mod threads;
 pub mod wkb;
 pub mod workplace;
 
@@ -27,5 +28,7 @@ pub use labels::{Dimension, Label};
 pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
+
+pub use threads::threads;
 
 pub use survey::{LabelFields, Selection, Survey, Target, survey};

@@ -122,12 +122,22 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     ))
 }
 
+/// What the record says about the map.
+pub fn reference(map: &Survey, patches: usize) -> Reference {
+    Reference {
+        vertices: map.vertices.len(),
+        patches,
+        vertices_sha256: map.vertices.digest(),
+        crs: map.crs.as_ref().map(|crs| crs.label()),
+    }
+}
+
 /// The record of a marking.
 pub fn record(
     options: &Options,
     subject: &Subject,
     key: &SecretKey,
-    map: &Survey,
+    reference: Reference,
     marked: &Marked,
 ) -> Record {
     let parameters = &options.parameters;
@@ -150,12 +160,7 @@ pub fn record(
         precision_crs_units: parameters.precision,
         layers: options.layers.clone(),
         srs: options.srs.clone(),
-        reference: Reference {
-            vertices: map.vertices.len(),
-            patches: marked.patches,
-            vertices_sha256: map.vertices.digest(),
-            crs: map.crs.as_ref().map(|crs| crs.label()),
-        },
+        reference,
         displacement: marked.displacement,
         angles: marked.angles,
         topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },

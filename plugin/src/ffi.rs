@@ -10,13 +10,12 @@ use crate::{
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
-use meshmark_dataset::marking::NotMoved;
+use meshmark_dataset::{marking::NotMoved, threads};
 use std::{
     ffi::{CString, c_char},
     path::Path,
     ptr, slice,
     sync::OnceLock,
-    thread::available_parallelism,
 };
 
 type OptionList = *const *const c_char;
@@ -232,12 +231,6 @@ pub fn fail(name: &str, error: &Error) {
 
 pub fn default_key_path() -> Option<String> {
     Some(config_option(c"MESHMARK_KEY".to_owned())).filter(|path| !path.is_empty())
-}
-
-/// GDAL_NUM_THREADS, which is ALL_CPUS or a number.
-pub fn threads() -> usize {
-    let all = available_parallelism().map_or(1, usize::from);
-    config_option(c"GDAL_NUM_THREADS".to_owned()).parse().map_or(all, |threads: usize| threads.clamp(1, 256))
 }
 
 fn config_option(name: CString) -> String {

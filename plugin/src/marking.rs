@@ -130,7 +130,8 @@ impl Marking {
         let message = request.subject.message(&request.key);
         let marked = pool(threads)?
             .install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
-        let record = marking::record(options, &request.subject, &request.key, &map, &marked).to_json();
+        let reference = marking::reference(&map, marked.patches);
+        let record = marking::record(options, &request.subject, &request.key, reference, &marked).to_json();
         let spelling = Spelling::OpenOption;
         let mut warnings = marking::warnings(&options.parameters, &message, &map, marked.patches, spelling);
         warnings.extend(marking::coordinates_as_text(source.dataset));

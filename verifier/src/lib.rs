@@ -12,6 +12,7 @@ mod crs_search;
 pub mod cubic;
 pub mod decision;
 pub mod decoys;
+pub mod distribute;
 mod error;
 pub mod explain;
 mod joined;
