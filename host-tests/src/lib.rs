@@ -1,4 +1,5 @@
 pub mod attacks;
+pub mod bench_distribute;
 pub mod cgal;
 pub mod contents;
 pub mod delaunay_check;

@@ -1,7 +1,7 @@
 //! The verifier: is this suspect a copy of that marked map?
 //!
 //! The data flows one way: [`reading`] → [`registration`] (with [`matching`]) → core's demodulation →
-//! [`decision`] → [`report`]. [`verify()`] is the whole of it.
+//! [`decision`] → [`report`]. [`verify()`] is the whole of it. [`distribute`] marks a map for many recipients.
 #![forbid(unsafe_code)]
 
 pub mod affine;

@@ -11,6 +11,7 @@ use meshmark_core::{
     spectrum::Basis,
 };
 use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
+use meshmark_host_tests::bench_distribute::Distributed;
 use serde_json::Value;
 use std::{
     error::Error,
@@ -58,6 +59,7 @@ struct Column {
     plain: Runs,
     marked: Runs,
     verified: Runs,
+    distributed: Distributed,
     /// The last report of `meshmark verify --json`.
     report: Value,
 }
@@ -77,7 +79,8 @@ impl Column {
             verified.0.push(work.run_verify()?);
         }
         let report = serde_json::from_slice(&fs::read(work.path("report.json"))?)?;
-        Ok(Column { name, stages, plain, marked, verified, report })
+        let distributed = Distributed::measure(&work.meshmark, &work.map, work.folder.path())?;
+        Ok(Column { name, stages, plain, marked, verified, distributed, report })
     }
 
     /// A stage of the last verification, seconds.
@@ -324,6 +327,7 @@ const ROWS: &[Row] = &[
     ("demodulation s", |c| seconds(c.verify_stage("demodulation"))),
     ("processor s", |c| format!("{:.2}", c.verified.processor())),
     ("peak memory MB", |c| format!("{:.0}", c.verified.peak_bytes() / 1e6)),
+    ("**`meshmark distribute`** to 1 / to 9 s; each further s; over plain", |c| c.distributed.cell()),
     ("verdict", |c| c.report["verdict"].as_str().unwrap_or("none").into()),
 ];
 

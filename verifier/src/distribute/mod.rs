@@ -141,13 +141,16 @@ fn stage(
         )));
     }
     let driver = format.driver;
+    let refused = |error: MapError| {
+        Err(Error::Usage(format!("the map {}: {}", request.map.display(), error.text(Spelling::Flag))))
+    };
     if layers.len() > 1 && !format.many_layers {
-        return Err(MapError::OneLayer { driver }.into());
+        return refused(MapError::OneLayer { driver });
     }
     let is_wgs84 =
         map.crs.as_ref().is_none_or(|crs| parse_srs("EPSG:4326").is_ok_and(|wgs84| crs.is_same(&wgs84)));
     if let (true, false, Some(layer)) = (format.is_wgs84_only(&[]), is_wgs84, layers.into_iter().next()) {
-        return Err(MapError::NotWgs84 { driver, layer }.into());
+        return refused(MapError::NotWgs84 { driver, layer });
     }
     Ok(staged)
 }
@@ -187,11 +190,10 @@ fn run(
         let write_next = || {
             let next = todo.lock().expect("nobody panics with it").next();
             next.map(|((copy, message), wanted)| {
-                let marked = pool.install(|| embedding.settle(&message, &wanted))?;
+                let marked = pool.install(|| embedding.settle(&message, &wanted)).map_err(Error::from);
                 drop(wanted);
-                writing::write(&job, copy, &marked).map_err(|error| error.of(&copy.recipient))?;
-                step(1);
-                Ok(())
+                let written = marked.and_then(|marked| writing::write(&job, copy, &marked));
+                written.map(|()| step(1)).map_err(|error| error.of(&copy.recipient))
             })
         };
         written += in_parallel(threads.min(batch.len()), write_next).map_err(|(done, error)| {

@@ -51,28 +51,36 @@ fn is_header(field: &str) -> bool {
 }
 
 /// Lines and what they hold, separated by what makes a header of the first one, else by commas.
-fn rows(text: &[u8]) -> std::result::Result<Vec<(u64, StringRecord)>, String> {
+fn rows(text: &[u8]) -> std::result::Result<Vec<(usize, StringRecord)>, String> {
     let all = DELIMITERS.map(|delimiter| rows_between(text, delimiter));
-    let has_header = |rows: &std::result::Result<Vec<(u64, StringRecord)>, String>| {
+    let has_header = |rows: &std::result::Result<Vec<(usize, StringRecord)>, String>| {
         rows.as_ref().is_ok_and(|rows| rows.first().is_some_and(|(_, first)| first.iter().any(is_header)))
     };
     let chosen = all.iter().position(has_header).unwrap_or(0);
     all.into_iter().nth(chosen).expect("it is one of them")
 }
 
-fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(u64, StringRecord)>, String> {
+fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, StringRecord)>, String> {
     let mut reader = ReaderBuilder::new();
     let mut reader =
         reader.has_headers(false).flexible(true).trim(Trim::All).delimiter(delimiter).from_reader(text);
+    // The reader counts a line before it skips the empty ones ahead of it.
+    let (mut counted, mut line) = (0, 1);
+    let mut line_at = |position: Option<&csv::Position>| {
+        let start = position.map_or(0, |at| at.byte() as usize);
+        let empty = text[start..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
+        line += text[counted..start + empty].iter().filter(|byte| **byte == b'\n').count();
+        counted = start + empty;
+        line
+    };
     let mut rows = Vec::new();
     for row in reader.records() {
         let row = row.map_err(|error| match error.position() {
-            Some(at) => format!("is not UTF-8 in line {}: save it as UTF-8", at.line()),
+            Some(at) => format!("is not UTF-8 in line {}: save it as UTF-8", line_at(Some(at))),
             None => format!("cannot be read: {error}"),
         })?;
-        let line = row.position().map_or(0, csv::Position::line);
         if !row.iter().all(str::is_empty) {
-            rows.push((line, row));
+            rows.push((line_at(row.position()), row));
         }
     }
     Ok(rows)
@@ -115,9 +123,9 @@ mod tests {
 
     #[test]
     fn a_recipient_given_again_gets_one_copy_and_a_warning() {
-        let (recipients, warning) = parse(b"A\nB\nA \na\n");
+        let (recipients, warning) = parse(b"A\n\nB\nA \na\n");
         assert_eq!(recipients, ["A", "B", "a"]);
-        assert!(warning.contains("\"A\" is there again in line 3"), "{warning}");
+        assert!(warning.contains("\"A\" is there again in line 4"), "{warning}");
     }
 
     #[test]
@@ -131,8 +139,8 @@ mod tests {
             (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
             (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
         ] {
-            let (none, text) = (parse(text), text);
-            assert!(none.1.contains(error), "{}: {}", String::from_utf8_lossy(text), none.1);
+            let (_, found) = parse(text);
+            assert!(found.contains(error), "{}: {found}", String::from_utf8_lossy(text));
         }
     }
 }
