@@ -18,7 +18,7 @@ use meshmark_dataset::{
     read_back::Comparison,
     workplace::{Workplace, file_error},
 };
-use std::{fs, path::Path};
+use std::{ffi::OsStr, fs, path::Path};
 
 /// What happens to files that nobody sees before they are synced and published.
 const UNSEEN: [(&str, &str); 2] = [("OGR_SQLITE_SYNCHRONOUS", "OFF"), ("OGR_SQLITE_JOURNAL", "OFF")];
@@ -124,19 +124,22 @@ fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
 /// Puts the record and the files in `folder` into their places, the main file last.
 fn publish(copy: &Copy, workplace: &Workplace, folder: &Path, record: &str, format: &Format) -> Result<()> {
     let mut publication = Publication::default();
+    // Without links and from the root: who takes a publication back may be elsewhere.
+    let places = workplace.folder().parent().expect("a workplace is in a folder");
+    let place = |name: Option<&OsStr>| places.join(name.expect("a copy has a name"));
     let is_there = fs::read(&copy.record).is_ok_and(|bytes| bytes == record.as_bytes());
     if !is_there {
         let staged = workplace.folder().join("record.json");
         fs::write(&staged, record).map_err(|error| file_error("writing", &staged, error))?;
-        publication.companions.push(Move { from: staged, to: copy.record.clone() });
+        publication.companions.push(Move { from: staged, to: place(copy.record.file_name()) });
     }
     let entries = fs::read_dir(folder).map_err(|error| file_error("reading", folder, error))?;
     for entry in entries.flatten() {
         if entry.path().is_dir() {
             return Err(MapError::Folder { driver: format.driver }.into());
         }
-        let part = Move { to: copy.file.with_file_name(entry.file_name()), from: entry.path() };
-        match part.to == copy.file {
+        let part = Move { to: place(Some(&entry.file_name())), from: entry.path() };
+        match part.to.file_name() == copy.file.file_name() {
             true => publication.main = part,
             false => publication.companions.push(part),
         }
