@@ -109,7 +109,7 @@ mod tests {
             "recipient\r\nACME GmbH\r\n\r\n  Öster AB  \r\n",
             "\u{feff}Recipient\nACME GmbH\nÖster AB",
             "id,recipient\n1,ACME GmbH\n2,\"Öster AB\"\n",
-            "id;recipient;note\n1;ACME GmbH;a, b\n,,\n2;Öster AB\n",
+            "id;recipient;note\n1;ACME GmbH;a, b\n;;\n2;Öster AB\n",
             "recipient\tid\nACME GmbH\t1\nÖster AB\t2\n",
         ] {
             assert_eq!(
