@@ -39,37 +39,28 @@ pub struct Marked {
 /// So many patches are solved again to read the message back; only when it is not in them, all.
 const READ_BACK_PATCHES: usize = 16;
 
+/// What the wanted displacements of a batch of messages may take, bytes: 16 for each vertex and message.
+const MOST_BATCH_BYTES: usize = 512 << 20;
+
 /// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch, T-junctions kept, nothing pushed through a
 /// segment, held within the tolerance and put on the output grid. The message is read back from the result
 /// before it is returned.
 ///
 /// # Errors
-/// Everything of [`Patches::new`], [`Patches::carriers`], a PRECISION that is coarser than
-/// TOLERANCE, and [`Error::MessageLost`].
+/// Those of [`Embedding::new`] and [`Embedding::settle`].
 pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Parameters) -> Result<Marked> {
-    let placement = Placement::new(map, parameters)?;
-    let tree = VertexTree::of_all(map);
-    let patches = Patches::with_tree(map, &tree, parameters)?;
-    let carriers = patches.carriers(message.len(), parameters)?;
-    let signs = parameters.code.encode(message);
-    let job = Job { map, carrier: Carrier::new(key), signs, carriers, parameters };
-    let settled = settle(map, &tree, patches.constraints(), &job.wanted(&patches)?, &placement);
-    job.check_message(message, &patches, &settled)?;
-    Ok(Marked {
-        displacement: Displacement::between(map.vertices, &settled.coords, &map.ground),
-        angles: AngleChange::at_corners(map, &settled.coords),
-        coords: settled.coords,
-        patches: patches.as_slice().len(),
-        junctions: patches.constraints().junctions.hanging().len(),
-        attenuated: settled.attenuated,
-    })
+    let embedding = Embedding::new(map, key, message.len(), parameters)?;
+    let wanted = embedding.wanted(std::slice::from_ref(message), &|_| ())?;
+    embedding.settle(message, &wanted[0])
 }
 
-struct Job<'a> {
+/// All of a marking that does not depend on the message.
+pub struct Embedding<'a> {
     map: &'a Map<'a>,
+    placement: Placement,
+    tree: VertexTree<'a>,
+    patches: Patches,
     carrier: Carrier,
-    /// b′, the channel bits.
-    signs: Vec<f64>,
     carriers: usize,
     parameters: &'a Parameters,
 }
@@ -77,34 +68,108 @@ struct Job<'a> {
 /// A displacement is read back as if with this noise at least, metres.
 const LEAST_NOISE_M: f64 = 0.01;
 
-impl Job<'_> {
-    /// The displacement that is the mark, of every vertex, CRS units.
-    fn wanted(&self, patches: &Patches) -> Result<Vec<[f64; 2]>> {
-        let all = patches.as_slice();
-        let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<[f64; 2]>> {
-            let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
-            let gain = match self.parameters.shape {
-                Shape::Free => 1.0,
-                Shape::Rigid => {
-                    Response::new(patch, basis.vectors.subcols(1, self.carriers).to_owned()).gain()
+impl<'a> Embedding<'a> {
+    /// Meshes the map and cuts it into patches, for messages of so many bits.
+    ///
+    /// # Errors
+    /// Everything of [`Patches::new`], [`Patches::carriers`], and a PRECISION that is coarser than TOLERANCE.
+    pub fn new(
+        map: &'a Map<'a>,
+        key: &SecretKey,
+        bits: usize,
+        parameters: &'a Parameters,
+    ) -> Result<Embedding<'a>> {
+        let placement = Placement::new(map, parameters)?;
+        let tree = VertexTree::of_all(map);
+        let patches = Patches::with_tree(map, &tree, parameters)?;
+        let carriers = patches.carriers(bits, parameters)?;
+        Ok(Embedding { map, placement, tree, patches, carrier: Carrier::new(key), carriers, parameters })
+    }
+
+    /// How many patches there are.
+    pub fn patches(&self) -> usize {
+        self.patches.as_slice().len()
+    }
+
+    /// How many messages [`Self::wanted`] may be asked for at once within the memory for it, at least one.
+    pub fn batch(&self) -> usize {
+        (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * self.map.vertices.len())).max(1)
+    }
+
+    /// The displacements that are the marks, for every message those of all vertices, CRS units. Every patch is
+    /// solved once for all of them, and its basis is not kept. `progress` is called once for every patch.
+    ///
+    /// # Errors
+    /// A patch that cannot be solved.
+    pub fn wanted(
+        &self,
+        messages: &[Message],
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<Vec<[f64; 2]>>> {
+        let signs: Vec<Vec<f64>> = messages.iter().map(|m| self.parameters.code.encode(m)).collect();
+        let all = self.patches.as_slice();
+        // In blocks, so that the displacements of few patches are held twice.
+        let block = 64 * rayon::current_num_threads();
+        let mut wanted = vec![vec![[0.0; 2]; self.map.vertices.len()]; messages.len()];
+        for (first, patches) in (0..all.len()).step_by(block).zip(all.chunks(block)) {
+            let of_patch = |(i, patch)| {
+                let found = self.wanted_of_patch(first + i, patch, &signs);
+                progress(1);
+                found
+            };
+            let found: Vec<Vec<Vec<[f64; 2]>>> =
+                patches.par_iter().enumerate().map(of_patch).collect::<Result<_>>()?;
+            for (patch, found) in patches.iter().zip(found) {
+                for (wanted, found) in wanted.iter_mut().zip(found) {
+                    let places = patch.vertices.iter().map(|&vertex| vertex as usize);
+                    places.zip(found).for_each(|(vertex, displacement)| wanted[vertex] = displacement);
                 }
-            };
-            let modulate = |chips: Vec<f64>| basis.synthesise(&self.coefficients(&chips, gain));
-            let [x, y] = self.chips(number).map(modulate);
-            let in_units = |((&vertex, x), y): ((&u32, f64), f64)| {
-                let scale = self.map.ground.metres_per_unit(self.map.at(vertex));
-                [x / scale[0], y / scale[1]]
-            };
-            Ok(patch.vertices.iter().zip(x).zip(y).map(in_units).collect())
-        };
-        let found: Vec<Vec<[f64; 2]>> = all.par_iter().enumerate().map(of_patch).collect::<Result<_>>()?;
-        let mut wanted = vec![[0.0; 2]; self.map.vertices.len()];
-        for (patch, found) in all.iter().zip(found) {
-            for (&vertex, displacement) in patch.vertices.iter().zip(found) {
-                wanted[vertex as usize] = displacement;
             }
         }
         Ok(wanted)
+    }
+
+    /// The displacements of the vertices of a patch for every message's signs b′, CRS units.
+    fn wanted_of_patch(
+        &self,
+        number: usize,
+        patch: &Patch,
+        signs: &[Vec<f64>],
+    ) -> Result<Vec<Vec<[f64; 2]>>> {
+        let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
+        let gain = match self.parameters.shape {
+            Shape::Free => 1.0,
+            Shape::Rigid => Response::new(patch, basis.vectors.subcols(1, self.carriers).to_owned()).gain(),
+        };
+        let chips = self.chips(number);
+        let in_units = |((&vertex, x), y): ((&u32, f64), f64)| {
+            let scale = self.map.ground.metres_per_unit(self.map.at(vertex));
+            [x / scale[0], y / scale[1]]
+        };
+        let of_message = |signs: &Vec<f64>| {
+            let modulate = |chips| basis.synthesise(&self.coefficients(chips, signs, gain));
+            let [x, y] = [0, 1].map(|axis| modulate(&chips[axis]));
+            patch.vertices.iter().zip(x).zip(y).map(in_units).collect()
+        };
+        Ok(signs.iter().map(of_message).collect())
+    }
+
+    /// The map marked with a message, of which `wanted` are the displacements.
+    ///
+    /// # Errors
+    /// [`Error::MessageLost`].
+    pub fn settle(&self, message: &Message, wanted: &[[f64; 2]]) -> Result<Marked> {
+        let Embedding { map, patches, .. } = self;
+        let settled = settle(map, &self.tree, patches.constraints(), wanted, &self.placement);
+        self.check_message(message, &settled)?;
+        Ok(Marked {
+            displacement: Displacement::between(map.vertices, &settled.coords, &map.ground),
+            angles: AngleChange::at_corners(map, &settled.coords),
+            coords: settled.coords,
+            patches: patches.as_slice().len(),
+            junctions: patches.constraints().junctions.hanging().len(),
+            attenuated: settled.attenuated,
+        })
     }
 
     fn chips(&self, patch: usize) -> [Vec<f64>; 2] {
@@ -112,16 +177,16 @@ impl Job<'_> {
     }
 
     /// The coefficients that modulate the message: 0 for the mean, then α p_i b′_j, amplified by `gain`.
-    fn coefficients(&self, chips: &[f64], gain: f64) -> Vec<f64> {
+    fn coefficients(&self, chips: &[f64], signs: &[f64], gain: f64) -> Vec<f64> {
         let chip_rate = self.parameters.chip_rate;
         let modulated = chips.iter().enumerate().map(|(i, chip)| {
-            gain * self.parameters.amplitude_m * chip * self.signs[bit_of_coefficient(i + 1, chip_rate)]
+            gain * self.parameters.amplitude_m * chip * signs[bit_of_coefficient(i + 1, chip_rate)]
         });
         std::iter::once(0.0).chain(modulated).collect()
     }
 
     /// Reads the message back as the verifier does, from as many patches as it takes.
-    fn check_message(&self, message: &Message, patches: &Patches, settled: &Settled) -> Result<()> {
+    fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
         let from = self.map.vertices.coords().iter();
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));
         let observed: Vec<Option<[f64; 2]>> = from.zip(&settled.coords).map(moved).collect();
@@ -133,13 +198,13 @@ impl Job<'_> {
             weights: vec![1.0; observed.len()],
         };
         let read = |count: usize| {
-            let (patches, bits) = (patches.head(count), message.len());
+            let (patches, bits) = (self.patches.head(count), message.len());
             joint(&patches, &self.carrier, &observed, bits, self.parameters, &disturbance, &|_| ())
         };
         if read(READ_BACK_PATCHES)?.message() == *message {
             return Ok(());
         }
-        match read(patches.as_slice().len())?.message().errors(message) {
+        match read(self.patches())?.message().errors(message) {
             0 => Ok(()),
             errors => Err(Error::MessageLost { errors, bits: message.len() }),
         }

@@ -6,7 +6,7 @@ use meshmark_core::{
     code::Code,
     deformation::Deformation,
     demodulation::{self, Demodulation},
-    embedding::embed,
+    embedding::{Embedding, embed},
     ground::Ground,
     key::SecretKey,
     map::Map,
@@ -223,6 +223,26 @@ fn output_is_bit_equal_for_any_number_of_threads() {
 }
 
 /// A square grid of side² vertices, 10 m apart: hundreds of repeated eigenvalues.
+#[test]
+fn messages_marked_together_are_those_marked_alone() {
+    let table = grid(40);
+    let map = Map::of_points(&table, METRES);
+    for parameters in [small(), Parameters { shape: meshmark_core::options::Shape::Rigid, ..small() }] {
+        let messages =
+            [MESSAGE, "fedcba9876543210", "00ff00ff00ff00ff"].map(|h| Message::from_hex(h).unwrap());
+        let embedding = Embedding::new(&map, &key(), 64, &parameters).unwrap();
+        let steps = std::sync::atomic::AtomicUsize::new(0);
+        let wanted = embedding.wanted(&messages, &|n| {
+            steps.fetch_add(n, std::sync::atomic::Ordering::Relaxed);
+        });
+        assert_eq!(steps.into_inner(), embedding.patches());
+        for (message, wanted) in messages.iter().zip(wanted.unwrap()) {
+            let together = embedding.settle(message, &wanted).unwrap();
+            assert_eq!(together, embed(&map, &key(), message, &parameters).unwrap());
+        }
+    }
+}
+
 fn grid(side: i32) -> VertexTable {
     let coords = (0..side * side).map(|i| [f64::from(i % side) * 10.0, f64::from(i / side) * 10.0]);
     VertexTable::new(coords.collect()).unwrap()

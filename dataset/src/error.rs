@@ -17,6 +17,14 @@ pub enum Error {
     Unreadable { layer: String, reason: String },
     Reprojection { layer: String, reason: String },
     TooLarge { most: usize },
+    TooSmall { size_m: f64, tolerance_m: f64 },
+    UnknownFormat { named: Option<String>, extension: Option<String>, known: String },
+    OneLayer { driver: &'static str },
+    NotWgs84 { driver: &'static str, layer: String },
+    Folder { driver: &'static str },
+    NotKept { driver: &'static str, layer: String, difference: String },
+    File { action: &'static str, path: String, reason: String },
+    Exists { path: String, remedy: &'static str },
     Gdal(gdal::errors::GdalError),
     Core(meshmark_core::Error),
 }
@@ -88,6 +96,41 @@ impl Error {
                 )
             }
             Error::TooLarge { most } => format!("the map has more than {most} vertices: cut it into sheets"),
+            Error::TooSmall { size_m, tolerance_m } => format!(
+                "the whole map is {size_m:.1e} m wide, and the mark moves vertices by up to {} m: if the units are not \
+                 those of its CRS, correct that ({}, -a_srs), else lower {} and {}",
+                spelling.value("TOLERANCE", tolerance_m),
+                spelling.name("SRS"),
+                spelling.name("TOLERANCE"),
+                spelling.name("AMPLITUDE")
+            ),
+            Error::UnknownFormat { named, extension, known } => {
+                let what = match (named, extension) {
+                    (Some(name), _) => spelling.value("FORMAT", name),
+                    (None, Some(extension)) => format!("extension \"{extension}\""),
+                    (None, None) => "a name without extension".into(),
+                };
+                format!(
+                    "{what} is not a format that a marked map is written to, only {known} are: write a GPKG and \
+                     convert it, or mark by reading (ogr2ogr -f <format> <target> MESHMARK:<source>); both keep the mark"
+                )
+            }
+            Error::OneLayer { driver } => {
+                format!("{driver} holds one layer, and this is the second: choose one, or write a GeoPackage")
+            }
+            Error::NotWgs84 { driver, layer } => format!(
+                "layer \"{layer}\" is not in WGS 84, into which {driver} would bring it after it was marked: add -t_srs \
+                 EPSG:4326"
+            ),
+            Error::Folder { driver } => {
+                format!("{driver} would make a folder of it: write one layer, or a GeoPackage")
+            }
+            Error::NotKept { driver, layer, difference } => format!(
+                "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; choose \
+                 another format or its options"
+            ),
+            Error::File { action, path, reason } => format!("{action} {path} failed: {reason}"),
+            Error::Exists { path, remedy } => format!("{path} exists: {remedy}"),
             Error::Gdal(error) => error.to_string(),
             Error::Core(error) => error.text(spelling),
         }

@@ -1,5 +1,5 @@
 //! GDAL datasets ↔ vertices: the one place that walks layers and geometries, so that the driver
-//! and the verifier see the same map.
+//! and the verifier see the same map; and how a marked one becomes a file: formats, reading back, publication.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -7,18 +7,28 @@ mod assumption;
 mod crs;
 mod error;
 mod features;
+mod file_id;
+pub mod formats;
 mod labels;
+pub mod marking;
+pub mod publication;
+pub mod read_back;
 mod shapes;
 mod survey;
+mod threads;
 pub mod wkb;
+pub mod workplace;
 
 pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Error, Result};
 pub use features::{FeatureGeometry, features};
+pub use file_id::{FileId, same_file};
 pub use labels::{Dimension, Label};
 pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
+
+pub use threads::threads;
 
 pub use survey::{LabelFields, Selection, Survey, Target, survey};

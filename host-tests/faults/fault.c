@@ -1,6 +1,6 @@
 /* Preloaded into a host to make it fail: at the n-th call that changes files the process is killed
    (FAULT=kill), or from then on the disk is full (FAULT=full). FAULT_AT is n; calls are counted from 1.
-   At the end the number of calls is written to the file FAULT_LOG, if there is one. */
+   Programs that the host starts are spared. At the end the number of calls is written to the file FAULT_LOG, if there is one. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -29,6 +29,11 @@ static int disk_is_full(void)
         return 0;
     errno = ENOSPC;
     return 1;
+}
+
+__attribute__((constructor)) static void spare_children(void)
+{
+    unsetenv("LD_PRELOAD");
 }
 
 __attribute__((destructor)) static void report(void)

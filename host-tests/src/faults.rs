@@ -79,40 +79,13 @@ impl Scene {
     pub fn write(&self, fault: Option<Fault>) -> Run {
         let options: Vec<&str> = self.options.iter().map(String::as_str).collect();
         let arguments = Host::create_arguments(&self.target, "in.geojson", &options);
-        let (kind, at) = match fault {
-            Some(Fault::Kill(at)) => ("kill", at.to_string()),
-            Some(Fault::FullDisk(at)) => ("full", at.to_string()),
-            _ => ("none", String::new()),
-        };
-        let before: Vec<String> = match fault {
-            Some(Fault::KillAfter(seconds)) => {
-                vec!["timeout".into(), "-s".into(), "KILL".into(), seconds.to_string()]
-            }
-            Some(Fault::FileSize(bytes)) => vec!["sh".into(), "-c".into(), limited(bytes), "sh".into()],
-            _ => Vec::new(),
-        };
-        let line: Vec<&str> = before
-            .iter()
-            .map(String::as_str)
-            .chain(["ogr2ogr"])
-            .chain(arguments.iter().map(String::as_str))
-            .collect();
-        let (preload, log) = (self.preload.display().to_string(), self.log().display().to_string());
-        let variables =
-            [("LD_PRELOAD", preload.as_str()), ("FAULT", kind), ("FAULT_AT", &at), ("FAULT_LOG", &log)];
-        // Shells and timers shall not fail, only the host.
-        let variables = if before.is_empty() { &variables[..] } else { &[] };
-        self.host.run_with(line[0], &line[1..], variables)
-    }
-
-    fn log(&self) -> PathBuf {
-        self.host.plugins().join("calls")
+        run(&self.host, &self.preload, "ogr2ogr", &arguments, fault)
     }
 
     /// How many calls change files when nothing fails.
     pub fn count_calls(&self) -> usize {
         self.write(None).succeeds();
-        fs::read_to_string(self.log()).unwrap().trim().parse().unwrap()
+        calls(&self.host)
     }
 
     /// Asserts that the output is complete or as it was, and says which.
@@ -179,6 +152,127 @@ impl Scene {
         if let Some(before) = &self.before {
             fs::write(self.host.path(&self.target), before).unwrap();
         }
+    }
+}
+
+/// A program runs in the host's folder, with a fault.
+fn run(host: &Host, preload: &Path, program: &str, arguments: &[String], fault: Option<Fault>) -> Run {
+    let (kind, at) = match fault {
+        Some(Fault::Kill(at)) => ("kill", at.to_string()),
+        Some(Fault::FullDisk(at)) => ("full", at.to_string()),
+        _ => ("none", String::new()),
+    };
+    let before: Vec<String> = match fault {
+        Some(Fault::KillAfter(seconds)) => {
+            vec!["timeout".into(), "-s".into(), "KILL".into(), seconds.to_string()]
+        }
+        Some(Fault::FileSize(bytes)) => vec!["sh".into(), "-c".into(), limited(bytes), "sh".into()],
+        _ => Vec::new(),
+    };
+    let before = before.iter().map(String::as_str);
+    let line: Vec<&str> =
+        before.clone().chain([program]).chain(arguments.iter().map(String::as_str)).collect();
+    let (preload, log) = (preload.display().to_string(), log(host).display().to_string());
+    let variables =
+        [("LD_PRELOAD", preload.as_str()), ("FAULT", kind), ("FAULT_AT", &at), ("FAULT_LOG", &log)];
+    // Shells and timers shall not fail, only the program.
+    let variables = if before.len() == 0 { &variables[..] } else { &[] };
+    host.run_with(line[0], &line[1..], variables)
+}
+
+fn log(host: &Host) -> PathBuf {
+    host.plugins().join("calls")
+}
+
+/// How many calls of the last program changed files.
+fn calls(host: &Host) -> usize {
+    fs::read_to_string(log(host)).unwrap().trim().parse().unwrap()
+}
+
+/// `meshmark distribute` to three recipients, which can be made to fail.
+pub struct Distribution {
+    /// The host.
+    pub host: Host,
+    preload: PathBuf,
+    format: &'static str,
+    /// What the folder of the copies holds when nothing fails: names, and what GDAL reads of maps.
+    complete: Vec<(String, String)>,
+}
+
+impl Distribution {
+    /// Prepares it, and lets it succeed once.
+    pub fn new(format: &'static str) -> Self {
+        let host = Host::new();
+        fs::write(host.path("in.geojson"), points(400, "")).unwrap();
+        fs::write(host.path("list.csv"), "recipient\nACME GmbH\nOther Ltd\nThird SARL\n").unwrap();
+        let preload = host.plugins().join("fault.so");
+        compile(&preload);
+        let mut distribution = Distribution { host, preload, format, complete: Vec::new() };
+        distribution.run(None).succeeds();
+        distribution.complete = distribution.contents();
+        assert_eq!(distribution.complete.iter().filter(|(name, _)| name.ends_with(".json")).count(), 3);
+        distribution
+    }
+
+    /// How many calls change files when nothing fails.
+    pub fn count_calls(&self) -> usize {
+        self.reset();
+        self.run(None).succeeds();
+        calls(&self.host)
+    }
+
+    /// Takes the copies away.
+    pub fn reset(&self) {
+        drop(fs::remove_dir_all(self.host.path("out")));
+    }
+
+    fn run(&self, fault: Option<Fault>) -> Run {
+        let line = "distribute --key key.json --recipients list.csv --output-dir out --patch-size 130 --code repetition \
+                    --chip-rate 1 in.geojson --format";
+        let arguments: Vec<String> = line.split_whitespace().chain([self.format]).map(String::from).collect();
+        run(&self.host, &self.preload, self.host.meshmark().to_str().unwrap(), &arguments, fault)
+    }
+
+    /// Runs with a fault and asserts that every copy that is there is complete, and that the same command again makes
+    /// the rest and leaves nothing else; how many copies there were before that.
+    #[track_caller]
+    pub fn survives(&self, fault: Fault) -> usize {
+        let failed = self.run(Some(fault));
+        let context = format!("{fault:?}: {:?} {}", failed.code, failed.stderr);
+        let is_main =
+            |name: &String| !name.starts_with('.') && [".gpkg", ".shp"].iter().any(|e| name.ends_with(e));
+        let there = if self.host.path("out").is_dir() { self.contents() } else { Vec::new() };
+        let copies: Vec<&String> = there.iter().map(|(name, _)| name).filter(|name| is_main(name)).collect();
+        for name in &copies {
+            let of_copy = |all: &[(String, String)]| {
+                let stem = name.rsplit_once('.').unwrap().0;
+                all.iter().filter(|(name, _)| name.starts_with(stem)).cloned().collect::<Vec<_>>()
+            };
+            assert_eq!(of_copy(&there), of_copy(&self.complete), "{context}");
+        }
+        let copies = copies.len();
+        let next = self.run(None);
+        assert_eq!(next.code, Some(0), "{context}\nnext: {}", next.stderr);
+        assert_eq!(self.contents(), self.complete, "{context}");
+        copies
+    }
+
+    fn contents(&self) -> Vec<(String, String)> {
+        let entries = fs::read_dir(self.host.path("out")).unwrap().map(|entry| entry.unwrap().path());
+        let read = |path: PathBuf| {
+            let name = path.file_name().unwrap().to_str().unwrap().to_string();
+            let is_map =
+                !name.starts_with('.') && [".gpkg", ".shp"].iter().any(|ending| name.ends_with(ending));
+            let text = match is_map {
+                true => format!("{:?}", crate::contents::read(&path)),
+                false if name.ends_with(".json") => fs::read_to_string(&path).unwrap(),
+                false => String::new(),
+            };
+            (name, text)
+        };
+        let mut all: Vec<(String, String)> = entries.map(read).collect();
+        all.sort();
+        all
     }
 }
 

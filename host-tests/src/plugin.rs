@@ -156,9 +156,14 @@ impl Host {
         self.run("ogr2ogr", &arguments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
+    /// The command `meshmark` that cargo built.
+    pub fn meshmark(&self) -> PathBuf {
+        library().with_file_name("meshmark")
+    }
+
     /// `meshmark verify --json` with the host's key; `more` holds flags and, last, the suspect.
     pub fn verify(&self, reference: &str, more: &[&str]) -> (Run, serde_json::Value) {
-        let command = library().with_file_name("meshmark");
+        let command = self.meshmark();
         let mut arguments = vec!["verify", "--json", "--key", "key.json", "--reference", reference];
         arguments.extend(more);
         let run = self.run(command.to_str().unwrap(), &arguments);

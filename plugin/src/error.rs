@@ -69,49 +69,21 @@ pub enum Error {
     Extended { overwrite: &'static str },
     #[error("{path} is {what}: a marked map is written to a file of its own, in a folder that exists")]
     NotAFile { path: String, what: &'static str },
-    #[error("{path} exists: {remedy}")]
-    Exists { path: String, remedy: &'static str },
     #[error("{path} is being written by another program ({sidecar} is there): wait until it is done")]
     TargetBusy { path: String, sidecar: String },
     #[error("{option} and {other} are the same file: give each a file of its own")]
     SameFile { option: &'static str, other: &'static str },
     #[error("REFERENCE={0} is written as GeoPackage: give it a name that ends in .gpkg")]
     ReferenceNotGeoPackage(String),
-    #[error(
-        "{what} is not a format that a marked map is written to, only {known} are: write a GPKG and convert it, or \
-         mark by reading (ogr2ogr -f <format> <target> MESHMARK:<source>); both keep the mark"
-    )]
-    UnknownFormat { what: String, known: String },
-    #[error("{driver} holds one layer, and this is the second: choose one, or write a GeoPackage")]
-    OneLayer { driver: &'static str },
-    #[error(
-        "layer \"{layer}\" is not in WGS 84, into which {driver} would bring it after it was marked: add -t_srs \
-         EPSG:4326"
-    )]
-    NotWgs84 { driver: &'static str, layer: String },
-    #[error("{driver} would make a folder of it: write one layer, or a GeoPackage")]
-    Folder { driver: &'static str },
     #[error("{what} failed: {reason}")]
     Writing { what: String, reason: String },
-    #[error("{action} {path} failed: {reason}")]
-    File { action: &'static str, path: String, reason: String },
     #[error("{0}: nothing is written, what was there stays as it was")]
     Unfinished(String),
-    #[error(
-        "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; choose \
-         another format or its options"
-    )]
-    NotKept { driver: &'static str, layer: String, difference: String },
     #[error(
         "only all but {errors} of {bits} bits of the message can be read from what was written: raise AMPLITUDE, or \
          choose a format that keeps more digits"
     )]
     MessageUnreadable { errors: usize, bits: usize },
-    #[error(
-        "the whole map is {size_m:.1e} m wide, and the mark moves vertices by up to TOLERANCE={tolerance_m} m: if the \
-         units are not those of its CRS, correct that (SRS, -a_srs), else lower TOLERANCE and AMPLITUDE"
-    )]
-    TooSmall { size_m: f64, tolerance_m: f64 },
     #[error(transparent)]
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]

@@ -5,17 +5,17 @@ use crate::{
     error::{Error, Result},
     ffi_errors::{Collector, guarded, report, silence_panics},
     ffi_source::{Borrowed, OwnedSource, strings, text},
-    marking::{Marking, NotMoved, Request, Source, split_options},
+    marking::{Marking, Request, Source, split_options},
     source_files::{is_being_read, save_copies},
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
+use meshmark_dataset::{marking::NotMoved, threads};
 use std::{
     ffi::{CString, c_char},
     path::Path,
     ptr, slice,
     sync::OnceLock,
-    thread::available_parallelism,
 };
 
 type OptionList = *const *const c_char;
@@ -123,7 +123,7 @@ unsafe extern "C" fn meshmark_move(
     guarded(-1, || {
         // SAFETY: the shim gives a marking that it holds and a buffer of `size` bytes.
         let (marking, wkb) = unsafe { (&*marking, slice::from_raw_parts_mut(wkb, size)) };
-        let error = match marking.move_geometry(wkb) {
+        let error = match marking.moves().geometry(wkb) {
             Ok(count) => return count as i64,
             Err(error) => error,
         };
@@ -231,12 +231,6 @@ pub fn fail(name: &str, error: &Error) {
 
 pub fn default_key_path() -> Option<String> {
     Some(config_option(c"MESHMARK_KEY".to_owned())).filter(|path| !path.is_empty())
-}
-
-/// GDAL_NUM_THREADS, which is ALL_CPUS or a number.
-pub fn threads() -> usize {
-    let all = available_parallelism().map_or(1, usize::from);
-    config_option(c"GDAL_NUM_THREADS".to_owned()).parse().map_or(all, |threads: usize| threads.clamp(1, 256))
 }
 
 fn config_option(name: CString) -> String {

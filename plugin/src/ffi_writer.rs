@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    ffi::{default_key_path, fail, mark, threads},
+    ffi::{default_key_path, fail, mark},
     ffi_errors::{guarded, report},
     ffi_output::{Described, FeatureRef, Field, LayerSpec},
     ffi_source::{Borrowed, OwnedSource, strings, text},
@@ -14,6 +14,7 @@ use gdal_sys::{
     CPLErr, GDALDatasetH, OGRFeatureH, OGRFieldDefnH, OGRLayerH, OGRSpatialReferenceH, OGRwkbGeometryType,
 };
 use meshmark_core::options::Creation;
+use meshmark_dataset::threads;
 use std::{
     ffi::{c_char, c_int},
     path::Path,

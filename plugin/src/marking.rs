@@ -3,21 +3,21 @@
 use crate::{
     error::{Error, Result},
     output, record_file,
-    source_files::{SourceFiles, same_file},
+    source_files::SourceFiles,
 };
-use gdal::{Dataset, vector::LayerAccess};
+use gdal::Dataset;
 use meshmark_core::{
     carrier::Carrier,
-    demodulation,
-    embedding::{self, Marked},
+    demodulation, embedding,
     key::SecretKey,
-    map::Map,
-    message::{LEAST_IDENTIFYING_BITS, Message},
-    options::{Options, Parameters, Subject},
+    options::{Options, Spelling, Subject},
     patches::Patches,
-    record::{self, Record, Reference, TopologyEntry},
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey, wkb};
+use meshmark_dataset::{
+    LabelFields, MOST_VERTICES, Selection, Survey, Target,
+    marking::{self, Moves},
+    same_file, survey,
+};
 use std::{fs::File, io::Read, path::Path};
 use zeroize::Zeroizing;
 
@@ -126,13 +126,15 @@ impl Marking {
         let map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map()?;
-        check_extent(&on_ground, &options.parameters)?;
+        marking::check_extent(&on_ground, &options.parameters)?;
         let message = request.subject.message(&request.key);
         let marked = pool(threads)?
             .install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
-        let record = record(request, &map, &marked).to_json();
-        let mut warnings = warnings(&options.parameters, &message, &map, &marked);
-        warnings.extend(coordinates_as_text(source.dataset));
+        let reference = marking::reference(&map, marked.patches);
+        let record = marking::record(options, &request.subject, &request.key, reference, &marked).to_json();
+        let spelling = Spelling::OpenOption;
+        let mut warnings = marking::warnings(&options.parameters, &message, &map, marked.patches, spelling);
+        warnings.extend(marking::coordinates_as_text(source.dataset));
         Ok(Marking {
             name: source.name,
             map,
@@ -179,15 +181,9 @@ impl Marking {
         self.layers.as_ref().is_none_or(|layers| layers.iter().any(|layer| layer == name))
     }
 
-    /// Moves every coordinate of a WKB geometry; how many there are.
-    pub fn move_geometry(&self, bytes: &mut [u8]) -> std::result::Result<usize, NotMoved> {
-        let mut count = 0;
-        wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
-            count += 1;
-            let index = self.map.vertices.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
-            Ok(self.moved[index])
-        })?;
-        Ok(count)
+    /// Where the vertices go.
+    pub fn moves(&self) -> Moves<'_> {
+        Moves { from: &self.map.vertices, to: &self.moved }
     }
 
     /// The furthest any vertex moved along x and y, CRS units.
@@ -201,20 +197,6 @@ impl Marking {
     /// Fails when the source's files are not those that were marked.
     pub fn check_source(&self) -> Result<()> {
         self.files.check()
-    }
-}
-
-/// Why a geometry was not moved.
-pub enum NotMoved {
-    /// Its coordinate is not in the table.
-    UnknownVertex([f64; 2]),
-    /// Its bytes make no sense.
-    Wkb(wkb::WkbError),
-}
-
-impl From<wkb::WkbError> for NotMoved {
-    fn from(error: wkb::WkbError) -> Self {
-        NotMoved::Wkb(error)
     }
 }
 
@@ -235,93 +217,5 @@ fn check_record_is_no_source(options: &Options, files: &SourceFiles) -> Result<(
             Err(Error::RecordIsOther { path: path.clone(), what: "source" })
         }
         _ => Ok(()),
-    }
-}
-
-/// Smaller than so many tolerances a map would be noise after its marking.
-const LEAST_TOLERANCES: f64 = 10.0;
-
-fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
-    let (min, max) = map.vertices.bounds();
-    let [width_m, height_m] = map.ground.metres_between(min, max);
-    let size_m = width_m.max(height_m);
-    let tolerance_m = parameters.tolerance_m;
-    match map.vertices.len() > 1 && size_m < LEAST_TOLERANCES * tolerance_m {
-        true => Err(Error::TooSmall { size_m, tolerance_m }),
-        false => Ok(()),
-    }
-}
-
-/// What is legal and probably not meant.
-fn warnings(parameters: &Parameters, message: &Message, map: &Survey, marked: &Marked) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if map.crs.is_none() {
-        let text = "the source has no CRS: its units are taken as metres; say SRS=... if they are not";
-        warnings.push(text.into());
-    }
-    if message.len() < LEAST_IDENTIFYING_BITS {
-        warnings.push(format!(
-            "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
-             hexadecimal digits or more",
-            message.len(),
-            LEAST_IDENTIFYING_BITS / 4
-        ));
-    }
-    let channel_bits = parameters.code.encode(message).len();
-    let coefficients = 2 * marked.patches * channel_bits * parameters.chip_rate; // on two axes
-    let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.vertices.len() as f64).sqrt();
-    if wanted_rms_m > parameters.tolerance_m {
-        warnings.push(format!(
-            "AMPLITUDE={} would move the vertices by {wanted_rms_m:.2} m RMS, more than TOLERANCE={} m, where many of \
-             them are held: the map is distorted and the mark gains little; lower AMPLITUDE",
-            parameters.amplitude_m, parameters.tolerance_m
-        ));
-    }
-    warnings
-}
-
-/// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
-fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
-    let mut layers = dataset.layers();
-    let layer =
-        layers.find(|layer| layer.defn().fields().any(|field| field.name().eq_ignore_ascii_case("WKT")))?;
-    Some(format!(
-        "layer \"{}\" has an attribute \"WKT\", which stays as it is: if it holds the coordinates, anybody can undo the \
-         mark; leave it out, for example with -select, or open a CSV file with KEEP_GEOM_COLUMNS=NO",
-        layer.name()
-    ))
-}
-
-fn record(request: &Request, map: &Survey, marked: &Marked) -> Record {
-    let Request { options, subject, key, .. } = request;
-    let parameters = &options.parameters;
-    Record {
-        meshmark_record: record::VERSION,
-        software: concat!("meshmark ", env!("CARGO_PKG_VERSION")).into(),
-        key_id: key.id(),
-        recipient: match subject {
-            Subject::Recipient(text) => Some(text.clone()),
-            Subject::Message(_) => None,
-        },
-        message: subject.message(key).to_hex(),
-        amplitude_m: parameters.amplitude_m,
-        code: parameters.code,
-        chip_rate: parameters.chip_rate,
-        patch_size: parameters.patch_size,
-        tolerance_m: parameters.tolerance_m,
-        shape: parameters.shape,
-        basis: parameters.laplacian,
-        precision_crs_units: parameters.precision,
-        layers: options.layers.clone(),
-        srs: options.srs.clone(),
-        reference: Reference {
-            vertices: map.vertices.len(),
-            patches: marked.patches,
-            vertices_sha256: map.vertices.digest(),
-            crs: map.crs.as_ref().map(|crs| crs.label()),
-        },
-        displacement: marked.displacement,
-        angles: marked.angles,
-        topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
     }
 }

@@ -6,6 +6,7 @@
 //! all the same: for them it is copied first ([`save_copies`]).
 
 use crate::error::{Error, Result};
+use meshmark_dataset::{FileId, same_file};
 use std::{
     fs::{self, File, Metadata},
     io,
@@ -42,12 +43,6 @@ struct Watched {
     path: PathBuf,
     state: State,
     sidecars: [u64; 2],
-}
-
-#[derive(PartialEq, Clone, Copy)]
-struct FileId {
-    device: u64,
-    inode: u64,
 }
 
 /// Another state is another content.
@@ -124,25 +119,14 @@ impl Watched {
     }
 }
 
-impl FileId {
-    fn of(path: &Path) -> Option<Self> {
-        fs::metadata(path).ok().map(|metadata| State::of(&metadata).id)
-    }
-}
-
 impl State {
     fn of(metadata: &Metadata) -> Self {
         State {
-            id: FileId { device: metadata.dev(), inode: metadata.ino() },
+            id: FileId::of_metadata(metadata),
             length: metadata.len(),
             modified: (metadata.mtime(), metadata.mtime_nsec()),
         }
     }
-}
-
-/// Whether both paths lead to one file that exists.
-pub fn same_file(a: &Path, b: &Path) -> bool {
-    FileId::of(a).is_some_and(|id| FileId::of(b) == Some(id))
 }
 
 /// Whether both paths lead to one file, which need not exist yet.

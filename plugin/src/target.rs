@@ -2,12 +2,14 @@
 
 use crate::{
     error::{Error, Result},
-    formats::Format,
     marking::Request,
-    source_files::same_file,
-    workplace::{Workplace, file_error},
 };
 use meshmark_core::options::Creation;
+use meshmark_dataset::{
+    formats::Format,
+    same_file,
+    workplace::{Workplace, file_error},
+};
 use std::{
     ffi::{OsStr, OsString},
     fs,
@@ -60,7 +62,9 @@ impl Target {
 
     /// Fails when something is in the way.
     fn check_free(&self) -> Result<()> {
-        let exists = |path: &Path, remedy| Err(Error::Exists { path: path.display().to_string(), remedy });
+        let exists = |path: &Path, remedy| {
+            Err(meshmark_dataset::Error::Exists { path: path.display().to_string(), remedy }.into())
+        };
         if self.reference.exists() {
             return exists(
                 &self.reference,

@@ -13,9 +13,11 @@ use crate::{
     ffi_output::{Described, Feature, FeatureRef, Field, LayerSpec, Output},
     ffi_source::{OwnedSource, View},
     marking::{Marking, Request},
-    publication::{Move, Publication},
     read_back,
     target::{Places, Target},
+};
+use meshmark_dataset::{
+    publication::{Move, Publication},
     workplace::file_error,
 };
 use std::{fs, path::Path};
@@ -80,10 +82,12 @@ impl Writer {
         self.keep_failure(|writer| {
             let format = writer.target.format;
             if !writer.layers.is_empty() && !format.many_layers {
-                return Err(Error::OneLayer { driver: format.driver });
+                return Err(meshmark_dataset::Error::OneLayer { driver: format.driver }.into());
             }
             if format.is_wgs84_only(&spec.options) && !spec.is_wgs84() {
-                return Err(Error::NotWgs84 { driver: format.driver, layer: spec.name });
+                return Err(
+                    meshmark_dataset::Error::NotWgs84 { driver: format.driver, layer: spec.name }.into()
+                );
             }
             writer.schema.add_layer(&spec, false)?;
             let number = writer.layers.len();
@@ -322,7 +326,7 @@ fn publish(target: &Target, places: &Places, folder: &Path, record: &str) -> Res
     let entries = fs::read_dir(folder).map_err(|e| file_error("reading", folder, e))?;
     for entry in entries.flatten() {
         if entry.path().is_dir() {
-            return Err(Error::Folder { driver: target.format.driver });
+            return Err(meshmark_dataset::Error::Folder { driver: target.format.driver }.into());
         }
         let part = Move { to: target.path.with_file_name(entry.file_name()), from: entry.path() };
         match part.to == target.path {
@@ -330,5 +334,5 @@ fn publish(target: &Target, places: &Places, folder: &Path, record: &str) -> Res
             false => publication.companions.push(part),
         }
     }
-    publication.run(places.main.folder())
+    Ok(publication.run(places.main.folder())?)
 }

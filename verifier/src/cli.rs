@@ -12,6 +12,7 @@ use meshmark_verifier::{
     Demodulator, Error, ExitCode, Request, Result,
     candidates::verify_candidates,
     compare::{Comparison, compare, detail::Compared},
+    distribute,
     evidence::{self, Provenance},
     evidence_map::Target,
     html,
@@ -56,12 +57,38 @@ enum Subcommands {
     /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
     /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large.
     Compare(CompareArgs),
+    /// Write a marked copy of a map, and its record, for every recipient of a list
+    ///
+    /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears when it is complete, was
+    /// read back and carries its message; the same command again skips those that are there. Exit codes: 0 all copies
+    /// are there, 2 usage, or a copy that could not be written, 5 unreadable map, 6 too large.
+    Distribute(Box<DistributeArgs>),
     /// Write man pages and shell completions, for those who make packages
     #[command(hide = true)]
     PackageFiles {
         /// The folder to write them to
         folder: PathBuf,
     },
+}
+
+#[derive(Args)]
+struct DistributeArgs {
+    /// Key file made by `meshmark keygen`
+    #[arg(long, value_name = "FILE")]
+    key: PathBuf,
+    /// List of the recipients, CSV
+    #[arg(long, value_name = "FILE")]
+    recipients: PathBuf,
+    /// Folder for the copies and their records; made when it is not there
+    #[arg(long, value_name = "FOLDER")]
+    output_dir: PathBuf,
+    /// Format of the copies, by GDAL's short name: GPKG, "ESRI Shapefile", FlatGeobuf, GeoJSON, GeoJSONSeq
+    #[arg(short, long, default_value = "GPKG")]
+    format: String,
+    /// The map, unmarked; keep it, it is the reference of all copies
+    map: PathBuf,
+    #[command(flatten)]
+    marking: DistributeFlags,
 }
 
 #[derive(Args)]
@@ -132,22 +159,37 @@ struct VerifyArgs {
     marking: MarkingFlags,
 }
 
-/// The marking options as flags, from the one table.
+/// The marking options as flags of `verify`, from the one table.
 struct MarkingFlags(Vec<(&'static str, String)>);
+
+/// Those of `distribute`, whose subjects are in its list.
+struct DistributeFlags(Vec<(&'static str, String)>);
+
+const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
+
+/// A flag for every option that shapes the mark.
+fn flags(heading: &'static str) -> impl Iterator<Item = Arg> {
+    OPTIONS.iter().filter(|option| option.shapes_mark).map(move |option| {
+        let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
+        Arg::new(option.name)
+            .long(Spelling::Flag.name(option.name)[2..].to_string())
+            .value_name(option.name)
+            .allow_negative_numbers(true)
+            .help_heading(heading)
+            .help(format!("{}{default}", option.help))
+    })
+}
+
+/// What was given of them.
+fn given(matches: &ArgMatches) -> Vec<(&'static str, String)> {
+    let value = |name: &'static str| Some((name, matches.try_get_one::<String>(name).ok()??.clone()));
+    OPTIONS.iter().filter_map(|option| value(option.name)).collect()
+}
 
 impl Args for MarkingFlags {
     fn augment_args(command: Command) -> Command {
-        let flags = OPTIONS.iter().filter(|option| option.shapes_mark).map(|option| {
-            let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
-            Arg::new(option.name)
-                .long(Spelling::Flag.name(option.name)[2..].to_string())
-                .value_name(option.name)
-                .allow_negative_numbers(true)
-                .conflicts_with("records")
-                .help_heading("How the map was marked (taken from the record when there is one)")
-                .help(format!("{}{default}", option.help))
-        });
-        command.args(flags)
+        let heading = "How the map was marked (taken from the record when there is one)";
+        command.args(flags(heading).map(|flag| flag.conflicts_with("records")))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -157,9 +199,29 @@ impl Args for MarkingFlags {
 
 impl FromArgMatches for MarkingFlags {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
-        let given = |name: &'static str| Some((name, matches.get_one::<String>(name)?.clone()));
-        let names = OPTIONS.iter().filter(|option| option.shapes_mark).map(|option| option.name);
-        Ok(MarkingFlags(names.filter_map(given).collect()))
+        Ok(MarkingFlags(given(matches)))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for DistributeFlags {
+    fn augment_args(command: Command) -> Command {
+        let is_subject = |flag: &Arg| SUBJECTS.iter().any(|subject| flag.get_id() == subject);
+        command.args(flags("How the map is marked").filter(|flag| !is_subject(flag)))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for DistributeFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        Ok(DistributeFlags(given(matches)))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
@@ -195,6 +257,7 @@ pub fn run() -> ExitCode {
         Subcommands::Verify(args) => run_verify(*args),
         Subcommands::Compare(args) => run_compare(&args),
         Subcommands::PackageFiles { folder } => write_package_files(&folder),
+        Subcommands::Distribute(args) => run_distribute(*args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("meshmark: {error}");
@@ -251,6 +314,27 @@ fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
             Format::Json => comparison.to_json(),
         })?;
     }
+    Ok(ExitCode::Match)
+}
+
+fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
+    let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
+    let request = distribute::Request {
+        options: Options::parse(flags)?,
+        key: reading::key(&args.key)?,
+        map: args.map,
+        recipients: args.recipients,
+        folder: args.output_dir,
+        format: args.format,
+    };
+    let mut warn = |text: &str| eprintln!("meshmark: {text}");
+    let done = distribute::distribute(&request, &mut Progress::default(), &mut warn)?;
+    let copies = |count| if count == 1 { "1 copy".into() } else { format!("{count} copies") };
+    let before = match done.finished_before {
+        0 => String::new(),
+        count => format!(", {} there already", copies(count)),
+    };
+    println!("{} written to {}{before}", copies(done.written), request.folder.display());
     Ok(ExitCode::Match)
 }
 

@@ -73,6 +73,34 @@ impl Error {
     }
 }
 
+impl Error {
+    /// The same with a recipient before it.
+    pub(crate) fn of(self, recipient: &str) -> Self {
+        self.rephrased(|text| format!("\"{recipient}\": {text}"))
+    }
+
+    /// The same with more after it.
+    pub(crate) fn with(self, more: &str) -> Self {
+        self.rephrased(|text| text + more)
+    }
+
+    fn rephrased(self, f: impl FnOnce(String) -> String) -> Self {
+        match self {
+            Error::Usage(text) => Error::Usage(f(text)),
+            Error::DoesNotBelong(text) => Error::DoesNotBelong(f(text)),
+            Error::Unreadable(text) => Error::Unreadable(f(text)),
+            Error::TooLarge(text) => Error::TooLarge(f(text)),
+        }
+    }
+}
+
+/// An error of a map that is written: of its format, or of a place.
+impl From<meshmark_dataset::Error> for Error {
+    fn from(error: meshmark_dataset::Error) -> Self {
+        Error::Usage(error.text(Spelling::Flag))
+    }
+}
+
 /// An error of the algorithm is one of its parameters, which are flags here.
 impl From<meshmark_core::Error> for Error {
     fn from(error: meshmark_core::Error) -> Self {

@@ -1,7 +1,7 @@
 //! The verifier: is this suspect a copy of that marked map?
 //!
 //! The data flows one way: [`reading`] → [`registration`] (with [`matching`]) → core's demodulation →
-//! [`decision`] → [`report`]. [`verify()`] is the whole of it.
+//! [`decision`] → [`report`]. [`verify()`] is the whole of it. [`distribute`] marks a map for many recipients.
 #![forbid(unsafe_code)]
 
 pub mod affine;
@@ -12,6 +12,7 @@ mod crs_search;
 pub mod cubic;
 pub mod decision;
 pub mod decoys;
+pub mod distribute;
 mod error;
 pub mod evidence;
 pub mod evidence_map;

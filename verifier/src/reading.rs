@@ -2,16 +2,21 @@
 
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
-use meshmark_core::{ground::Ground, key::SecretKey, options::Spelling, record::Record};
+use meshmark_core::{
+    ground::Ground,
+    key::SecretKey,
+    options::{Options, Spelling},
+    record::Record,
+};
 use meshmark_dataset::{
     CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
-    survey,
+    marking, survey,
 };
 use std::{
+    cell::RefCell,
     collections::BTreeSet,
     io::Read,
     path::{Path, PathBuf},
-    sync::Mutex,
 };
 
 /// What a suspect may be: local files of plain formats. No format that points at other data (VRT,
@@ -35,20 +40,28 @@ const SUSPECT_DRIVERS: &[&str] = &[
 /// Keys and records are a few hundred bytes; a mistaken /dev/zero has no end.
 const LONGEST_TEXT: u64 = 1 << 20;
 
-/// GDAL's last error message, kept instead of printed.
-static LAST_FAILURE: Mutex<Option<String>> = Mutex::new(None);
+thread_local! {
+    /// GDAL's last error message on this thread, kept instead of printed.
+    static LAST_FAILURE: RefCell<Option<String>> = const { RefCell::new(None) };
+}
 
 /// Keeps GDAL from printing; its messages become part of ours. Call once, before anything else.
 pub fn quieten_gdal() {
     gdal::config::set_error_handler(|kind, _, message| {
         if matches!(kind, gdal::errors::CplErrType::Failure | gdal::errors::CplErrType::Fatal) {
-            *last_failure() = Some(message.to_string());
+            LAST_FAILURE.set(Some(message.to_string()));
         }
     });
 }
 
-fn last_failure() -> std::sync::MutexGuard<'static, Option<String>> {
-    LAST_FAILURE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+/// GDAL's last error message on this thread since [`forget_failure`].
+pub(crate) fn last_failure() -> Option<String> {
+    LAST_FAILURE.with_borrow(Clone::clone)
+}
+
+/// What failed before does not concern what comes now.
+pub(crate) fn forget_failure() {
+    LAST_FAILURE.set(None);
 }
 
 /// Reads a key file.
@@ -95,11 +108,40 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, &dataset, reading, Target::Own)
 }
 
+/// CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked. With @ the open option
+/// concerns only drivers that know it.
+pub(crate) const COLUMNS_OF_CSV: &str = "@KEEP_GEOM_COLUMNS=NO";
+
+/// Reads the vertices of a map to be marked.
+pub(crate) fn source(path: &Path, options: &Options, warn: &mut dyn FnMut(&str)) -> Result<Survey> {
+    if path.as_os_str().as_encoded_bytes().get(..9).is_some_and(|p| p.eq_ignore_ascii_case(b"MESHMARK:")) {
+        let path = path.display();
+        return Err(Error::Usage(format!(
+            "the map {path} is a marked view already: name the dataset itself"
+        )));
+    }
+    let dataset = open("map", path, None)?;
+    marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
+    read("map", path, &dataset, &reading_of(options), Target::Own)
+}
+
+/// Reads the vertices and the names of all layers of a copy of such a map.
+pub(crate) fn staged(path: &Path, options: &Options) -> Result<(Survey, Vec<String>)> {
+    let dataset = open("copy", path, Some(&["GPKG"]))?;
+    let survey = read("copy", path, &dataset, &reading_of(options), Target::Own)?;
+    Ok((survey, dataset.layers().map(|layer| layer.name()).collect()))
+}
+
+fn reading_of(options: &Options) -> Reading<'_> {
+    let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
+    Reading { layers, srs, landmarks: LabelFields::None }
+}
+
 /// The geometries of a map in order, for a comparison.
 pub fn geometries(what: &str, path: &Path, layers: Option<&[String]>) -> Result<Vec<FeatureGeometry>> {
     let dataset = open(what, path, None)?;
-    *last_failure() = None;
-    let found = features(&dataset, layers, &|| last_failure().clone());
+    forget_failure();
+    let found = features(&dataset, layers, &last_failure);
     found.map_err(|error| of_map(what, path, &error))
 }
 
@@ -270,14 +312,15 @@ fn crs_of(dataset: &Dataset) -> Vec<String> {
 }
 
 fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {
-    *last_failure() = None;
+    forget_failure();
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
+        open_options: Some(&[COLUMNS_OF_CSV]),
         allowed_drivers,
         ..Default::default()
     };
     Dataset::open_ex(path, options).map_err(|error| {
-        let reason = last_failure().take().unwrap_or_else(|| error.to_string());
+        let reason = last_failure().unwrap_or_else(|| error.to_string());
         let formats =
             allowed_drivers.map_or(String::new(), |d| format!(" (a suspect may be {})", d.join(", ")));
         Error::Unreadable(format!("the {what} {} cannot be opened: {reason}{formats}", path.display()))
@@ -289,19 +332,19 @@ fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: T
 }
 
 fn survey_of(dataset: &Dataset, reading: &Reading, target: Target) -> meshmark_dataset::Result<Survey> {
-    *last_failure() = None;
+    forget_failure();
     let selection = Selection {
         layers: reading.layers,
         srs: reading.srs,
         labels: reading.landmarks,
         target,
         most_vertices: MOST_VERTICES,
-        last_failure: &|| last_failure().clone(),
+        last_failure: &last_failure,
     };
     survey(dataset, &selection)
 }
 
-fn failed(what: &str, path: &Path, error: meshmark_dataset::Error) -> Error {
+pub(crate) fn failed(what: &str, path: &Path, error: meshmark_dataset::Error) -> Error {
     let text = format!("the {what} {}: {}", path.display(), error.text(Spelling::Flag));
     match error {
         meshmark_dataset::Error::TooLarge { .. } => Error::TooLarge(text),

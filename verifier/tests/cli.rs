@@ -57,6 +57,15 @@ fn make_files(folder: &Path) {
     write("table.csv", b"name,height\nTown hall,20\n");
     write("small.csv", b"id,WKT\n1,\"LINESTRING (385000 6672000,385010 6672000,385010 6672020)\"\n");
     write("degrees.csv", b"id,WKT\n1,\"LINESTRING (24.9 60.1,24.91 60.1,24.92 60.2)\"\n");
+    write("list.csv", b"ACME GmbH\nOther Ltd\n\nACME GmbH\n");
+    write("one.csv", b"recipient\nACME GmbH\n");
+    write("empty.csv", b"\n");
+    // A foreign file, and a finished copy.
+    for name in ["taken", "copies"] {
+        fs::create_dir_all(folder.join(name)).unwrap();
+        copy("vectors/marked.gpkg", &format!("{name}/acme-gmbh-f384e512.gpkg"));
+    }
+    copy("vectors/record.json", "copies/acme-gmbh-f384e512.json");
     write("truncated.gpkg", &fs::read(folder.join("marked.gpkg")).unwrap()[..100_000]);
     write(
         "marked.vrt",

@@ -19,6 +19,9 @@ use tempfile::TempDir;
 /// Maps of more vertices are measured once instead of twice, without the stages and without the script.
 const HUGE: usize = 1_000_000;
 
+/// Recipients of the long list.
+const MANY: usize = 9;
+
 /// Patches of half the size with one chip a bit: as many chips in the map, and a quarter of the solving.
 const SMALL_PATCHES: [&str; 6] = ["-oo", "PATCH_SIZE=256", "-oo", "CHIP_RATE=1", "-oo", "CODE=REPETITION"];
 
@@ -43,6 +46,8 @@ pub struct Jobs {
     pub small_patches: Runs,
     pub script: Runs,
     pub verified: Runs,
+    /// `meshmark distribute` to one recipient, and to nine.
+    pub distributed: [Runs; 2],
     /// Seconds of the stages of the last verification, and its verdict.
     pub verification: Value,
     pub verdict: Value,
@@ -65,6 +70,7 @@ impl Jobs {
             small_patches: Runs::default(),
             script: Runs::default(),
             verified: Runs::default(),
+            distributed: [Runs::default(), Runs::default()],
             verification: Value::Null,
             verdict: Value::Null,
         };
@@ -76,11 +82,21 @@ impl Jobs {
                 jobs.script.0.push(work.script(script)?);
             }
             jobs.verified.0.push(work.verify()?);
+            if vertices <= HUGE {
+                for (runs, recipients) in jobs.distributed.iter_mut().zip([1, MANY]) {
+                    runs.0.push(work.distribute(recipients)?);
+                }
+            }
         }
         let report: Value = serde_json::from_slice(&fs::read(work.path("report.json"))?)?;
         jobs.verification = report["seconds"].clone();
         jobs.verdict = report["verdict"].clone();
         Ok(jobs)
+    }
+
+    /// Seconds for each further recipient of `meshmark distribute`.
+    pub fn further_s(&self) -> f64 {
+        (self.distributed[1].best_s() - self.distributed[0].best_s()) / (MANY - 1) as f64
     }
 
     /// How many bytes of memory a vertex costs above plain `ogr2ogr`.
@@ -142,6 +158,24 @@ impl<'a> Work<'a> {
         let mut command = Command::new(python);
         command.arg(script).arg(self.map).arg(self.output("script.gpkg")?).arg("7");
         self.run(&mut command, &[0])
+    }
+
+    fn distribute(&self, recipients: usize) -> Result<Run> {
+        let names: String = (1..=recipients).map(|number| format!("recipient {number}\n")).collect();
+        fs::write(self.path("list.csv"), names)?;
+        let mut command = Command::new(&self.programs.meshmark);
+        command.args([
+            "distribute",
+            "--key",
+            "key.json",
+            "--recipients",
+            "list.csv",
+            "--output-dir",
+            "copies",
+        ]);
+        let run = self.run(command.arg(self.map), &[0])?;
+        fs::remove_dir_all(self.path("copies"))?;
+        Ok(run)
     }
 
     fn verify(&self) -> Result<Run> {

@@ -22,6 +22,11 @@ const ROWS: &[Row] = &[
     ("times MESHMARK", |j| ratio(j.script.best_s(), j.marked.best_s())),
     ("**`meshmark verify`**, s", |j| seconds(j.verified.best_s())),
     ("times MESHMARK", |j| ratio(j.verified.best_s(), j.marked.best_s())),
+    ("`meshmark distribute` to one recipient, to nine, s", |j| {
+        j.distributed.each_ref().map(|runs| seconds(runs.best_s())).join(", ")
+    }),
+    ("each further recipient, s", |j| seconds(j.further_s())),
+    ("times plain", |j| ratio(j.further_s(), j.plain.best_s())),
     ("processor s: plain, MESHMARK, verify", |j| {
         [&j.plain, &j.marked, &j.verified].map(|runs| seconds(runs.processor_s())).join(", ")
     }),

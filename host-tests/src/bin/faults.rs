@@ -1,7 +1,7 @@
 //! Kills writers of marked maps, and fills their disks, more often than the tests do: `make faults`.
 
 use clap::Parser;
-use meshmark_host_tests::faults::{Fault, Outcome, Scene};
+use meshmark_host_tests::faults::{Distribution, Fault, Outcome, Scene};
 use rand_chacha::{
     ChaCha20Rng,
     rand_core::{Rng, SeedableRng},
@@ -39,6 +39,18 @@ fn main() {
         run(&scene, &format!("{what}: full disk from a call on"), at().map(Fault::FullDisk));
         let moment = |_| Fault::KillAfter(0.01 + 0.8 * f64::from(random.next_u32()) / f64::from(u32::MAX));
         run(&scene, &format!("{what}: killed at a random moment"), (0..arguments.kills / 4).map(moment));
+    }
+    for format in ["GPKG", "ESRI Shapefile"] {
+        let distribution = Distribution::new(format);
+        let calls = distribution.count_calls();
+        let mut copies = [0; 4];
+        for at in (1..=calls).filter(|at| at % arguments.step == 0) {
+            for fault in [Fault::Kill(at), Fault::FullDisk(at)] {
+                distribution.reset();
+                copies[distribution.survives(fault)] += 1;
+            }
+        }
+        println!("distribute {format}: 0, 1, 2, 3 copies after {copies:?} faults, all after the next run");
     }
 }
 

@@ -5,11 +5,7 @@
 //! not, and undone: the same file is then in both places. The main file alone may replace another one, by a
 //! single rename. Side files that are in the way are moved into the workplace first, and back when it fails.
 
-use crate::{
-    error::{Error, Result},
-    source_files::same_file,
-    workplace::file_error,
-};
+use crate::{Error, Result, file_id::same_file, workplace::file_error};
 use std::{
     ffi::OsStr,
     fs::{self, File},

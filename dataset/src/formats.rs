@@ -1,6 +1,6 @@
 //! The formats a marked map is written to: those whose drivers were seen to keep what they were given.
 
-use crate::error::{Error, Result};
+use crate::{Error, Result};
 use std::path::Path;
 
 /// A format, by GDAL's driver for it.
@@ -59,13 +59,14 @@ impl Format {
         };
         FORMATS.iter().find(is_meant).ok_or_else(|| {
             let known: Vec<_> = FORMATS.iter().map(|format| format.driver).collect();
-            let what = match (named, target.extension()) {
-                (Some(name), _) => format!("FORMAT={name}"),
-                (None, Some(extension)) => format!("extension \"{}\"", extension.to_string_lossy()),
-                (None, None) => "a name without extension".into(),
-            };
-            Error::UnknownFormat { what, known: known.join(", ") }
+            let extension = target.extension().map(|extension| extension.to_string_lossy().into_owned());
+            Error::UnknownFormat { named: named.map(String::from), extension, known: known.join(", ") }
         })
+    }
+
+    /// How the names of its files end.
+    pub fn ending(&self) -> &'static str {
+        self.endings[0]
     }
 
     /// Whether the driver brings a layer with these options into WGS 84, which would happen after the marking.

@@ -4,10 +4,7 @@
 //! process that was killed: whoever next writes to that place undoes what was half published
 //! ([`crate::publication::recover`]) and removes it.
 
-use crate::{
-    error::{Error, Result},
-    publication,
-};
+use crate::{Error, Result, publication};
 use std::{
     ffi::OsStr,
     fs::{self, File, Permissions, TryLockError},

@@ -1,0 +1,168 @@
+//! A marking, apart from where its source comes from and where its result goes.
+
+use crate::{Error, Result, Survey, wkb};
+use gdal::{Dataset, vector::LayerAccess};
+use meshmark_core::{
+    embedding::Marked,
+    key::SecretKey,
+    map::Map,
+    message::{LEAST_IDENTIFYING_BITS, Message},
+    options::{Options, Parameters, Spelling, Subject},
+    record::{self, Record, Reference, TopologyEntry},
+    vertices::VertexTable,
+};
+
+/// Where the vertices of a map go.
+#[derive(Clone, Copy)]
+pub struct Moves<'a> {
+    /// The vertices.
+    pub from: &'a VertexTable,
+    /// The new place of each, in canonical order, CRS units.
+    pub to: &'a [[f64; 2]],
+}
+
+impl Moves<'_> {
+    /// Where a vertex goes; none when it is no vertex of the map.
+    pub fn of(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+        self.from.index_of(point).map(|index| self.to[index])
+    }
+
+    /// Moves every coordinate of a WKB geometry; how many there are.
+    ///
+    /// # Errors
+    /// A coordinate that is no vertex of the map, bytes that are not a geometry.
+    pub fn geometry(&self, bytes: &mut [u8]) -> std::result::Result<usize, NotMoved> {
+        let mut count = 0;
+        wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
+            count += 1;
+            self.of(point).ok_or(NotMoved::UnknownVertex(point))
+        })?;
+        Ok(count)
+    }
+}
+
+/// Why a geometry was not moved.
+pub enum NotMoved {
+    /// Its coordinate is not in the table.
+    UnknownVertex([f64; 2]),
+    /// Its bytes make no sense.
+    Wkb(wkb::WkbError),
+}
+
+impl From<wkb::WkbError> for NotMoved {
+    fn from(error: wkb::WkbError) -> Self {
+        NotMoved::Wkb(error)
+    }
+}
+
+/// Smaller than so many tolerances a map would be noise after its marking.
+const LEAST_TOLERANCES: f64 = 10.0;
+
+/// Fails for a map so small that its units cannot be meant.
+///
+/// # Errors
+/// [`Error::TooSmall`].
+pub fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
+    let (min, max) = map.vertices.bounds();
+    let [width_m, height_m] = map.ground.metres_between(min, max);
+    let size_m = width_m.max(height_m);
+    let tolerance_m = parameters.tolerance_m;
+    match map.vertices.len() > 1 && size_m < LEAST_TOLERANCES * tolerance_m {
+        true => Err(Error::TooSmall { size_m, tolerance_m }),
+        false => Ok(()),
+    }
+}
+
+/// What is legal and probably not meant.
+pub fn warnings(
+    parameters: &Parameters,
+    message: &Message,
+    map: &Survey,
+    patches: usize,
+    spelling: Spelling,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if map.crs.is_none() {
+        let srs = spelling.value("SRS", "...");
+        warnings
+            .push(format!("the source has no CRS: its units are taken as metres; say {srs} if they are not"));
+    }
+    if message.len() < LEAST_IDENTIFYING_BITS {
+        warnings.push(format!(
+            "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
+             hexadecimal digits or more",
+            message.len(),
+            LEAST_IDENTIFYING_BITS / 4
+        ));
+    }
+    let channel_bits = parameters.code.encode(message).len();
+    let coefficients = 2 * patches * channel_bits * parameters.chip_rate; // on two axes
+    let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.vertices.len() as f64).sqrt();
+    if wanted_rms_m > parameters.tolerance_m {
+        warnings.push(format!(
+            "{} would move the vertices by {wanted_rms_m:.2} m RMS, more than {} m, where many of them are held: the map \
+             is distorted and the mark gains little; lower {}",
+            spelling.value("AMPLITUDE", parameters.amplitude_m),
+            spelling.value("TOLERANCE", parameters.tolerance_m),
+            spelling.name("AMPLITUDE")
+        ));
+    }
+    warnings
+}
+
+/// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
+pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
+    let mut layers = dataset.layers();
+    let layer =
+        layers.find(|layer| layer.defn().fields().any(|field| field.name().eq_ignore_ascii_case("WKT")))?;
+    Some(format!(
+        "layer \"{}\" has an attribute \"WKT\", which stays as it is: if it holds the coordinates, anybody can undo the \
+         mark; leave it out, for example with -select, or open a CSV file with KEEP_GEOM_COLUMNS=NO",
+        layer.name()
+    ))
+}
+
+/// What the record says about the map.
+pub fn reference(map: &Survey, patches: usize) -> Reference {
+    Reference {
+        vertices: map.vertices.len(),
+        patches,
+        vertices_sha256: map.vertices.digest(),
+        crs: map.crs.as_ref().map(|crs| crs.label()),
+    }
+}
+
+/// The record of a marking.
+pub fn record(
+    options: &Options,
+    subject: &Subject,
+    key: &SecretKey,
+    reference: Reference,
+    marked: &Marked,
+) -> Record {
+    let parameters = &options.parameters;
+    Record {
+        meshmark_record: record::VERSION,
+        software: concat!("meshmark ", env!("CARGO_PKG_VERSION")).into(),
+        key_id: key.id(),
+        recipient: match subject {
+            Subject::Recipient(text) => Some(text.clone()),
+            Subject::Message(_) => None,
+        },
+        message: subject.message(key).to_hex(),
+        amplitude_m: parameters.amplitude_m,
+        code: parameters.code,
+        chip_rate: parameters.chip_rate,
+        patch_size: parameters.patch_size,
+        tolerance_m: parameters.tolerance_m,
+        shape: parameters.shape,
+        basis: parameters.laplacian,
+        precision_crs_units: parameters.precision,
+        layers: options.layers.clone(),
+        srs: options.srs.clone(),
+        reference,
+        displacement: marked.displacement,
+        angles: marked.angles,
+        topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
+    }
+}

@@ -1,0 +1,197 @@
+//! `meshmark distribute` against `ogr2ogr` through the driver: the same records, the same maps.
+
+use meshmark_host_tests::{
+    contents::{self, FeatureContents},
+    faults::{Distribution, Fault},
+    plugin::{Host, Run},
+};
+use std::fs;
+
+const RECIPIENTS: [(&str, &str); 2] =
+    [("ACME GmbH", "acme-gmbh-f384e512"), ("Öster AB", "öster-ab-5b966f44")];
+
+/// A host with a list of the recipients and a copy of a fixture.
+fn host() -> Host {
+    let host = Host::new();
+    fs::write(host.path("list.csv"), "recipient\nACME GmbH\nÖster AB\n").unwrap();
+    host.copy("kotka.gpkg", "map.gpkg");
+    host
+}
+
+fn distribute(host: &Host, folder: &str, map: &str, more: &[&str], threads: &str) -> Run {
+    let mut arguments =
+        vec!["distribute", "--key", "key.json", "--recipients", "list.csv", "--output-dir", folder, map];
+    arguments.extend(more);
+    host.run_with(host.meshmark().to_str().unwrap(), &arguments, &[("GDAL_NUM_THREADS", threads)])
+}
+
+/// What `ogrinfo` says of the layers of a map, without its name.
+fn summary(host: &Host, map: &str) -> String {
+    let text = host.run("ogrinfo", &["-al", "-so", map]).succeeds().stdout;
+    text.lines().filter(|line| !line.starts_with("INFO: ")).collect::<Vec<_>>().join("\n")
+}
+
+/// Adds what a copy might lose: ids with gaps, fields of all kinds with widths, nulls, a table, heights.
+fn enrich(host: &Host) {
+    let sql = |sql: &str| drop(host.run("ogrinfo", &["-q", "map.gpkg", "-sql", sql]).succeeds());
+    sql("UPDATE buildings SET fid = fid + 1000 WHERE fid % 3 = 0");
+    for field in [
+        "yes BOOLEAN",
+        "small SMALLINT DEFAULT 7",
+        "code TEXT(7)",
+        "day DATE",
+        "at DATETIME",
+        "raw BLOB",
+        "ratio FLOAT",
+    ] {
+        sql(&format!("ALTER TABLE buildings ADD COLUMN {field}"));
+    }
+    sql(
+        "UPDATE buildings SET yes = 1, code = 'x', day = '2024-02-29', at = '2024-02-29T12:00:00.000Z', raw = x'00ff', \
+         ratio = 0.1 WHERE fid % 2 = 0",
+    );
+    sql("UPDATE roads SET geom = NULL WHERE fid = 5");
+    fs::write(host.path("notes.csv"), "id,note\n1,a\n2,\n").unwrap();
+    let line = r#"{"type":"Feature","properties":{},"geometry":{"type":"LineString",
+        "coordinates":[[497000,6710700,1.5],[497010,6710710,2.5]]}}"#;
+    fs::write(host.path("heights.geojson"), line).unwrap();
+    host.run("ogr2ogr", &["-update", "map.gpkg", "notes.csv"]).succeeds();
+    host.run("ogr2ogr", &["-update", "-a_srs", "EPSG:3067", "map.gpkg", "heights.geojson"]).succeeds();
+}
+
+#[test]
+fn records_and_geopackages_are_those_of_the_driver() {
+    let host = host();
+    enrich(&host);
+    let done = distribute(&host, "out", "map.gpkg", &["-f", "GPKG", "--amplitude", "0.12"], "2").succeeds();
+    assert_eq!(done.stdout, "2 copies written to out\n");
+    for (recipient, stem) in RECIPIENTS {
+        let (copy, subject) = (format!("out/{stem}.gpkg"), format!("RECIPIENT={recipient}"));
+        let options =
+            ["-oo", "KEY=key.json", "-oo", &subject, "-oo", "AMPLITUDE=0.12", "-oo", "RECORD=driver.json"];
+        let line = [&["-f", "GPKG", "driver.gpkg", "MESHMARK:map.gpkg"], &options[..]].concat();
+        host.run("ogr2ogr", &line).succeeds();
+        let read = |name: &str| fs::read_to_string(host.path(name)).unwrap();
+        assert_eq!(read(&format!("out/{stem}.json")), read("driver.json"));
+        assert!(contents::read(&host.path(&copy)) == contents::read(&host.path("driver.gpkg")));
+        assert_eq!(summary(&host, &copy), summary(&host, "driver.gpkg"));
+        let index = "SELECT HasSpatialIndex('buildings', 'geom')";
+        let index = host.run("ogrinfo", &["-q", &copy, "-sql", index]).succeeds().stdout;
+        assert!(index.contains("HasSpatialIndex (Integer) = 1"), "{index}");
+        host.matches("map.gpkg", &["--record", &format!("out/{stem}.json"), &copy]);
+        for name in ["driver.gpkg", "driver.json"] {
+            fs::remove_file(host.path(name)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn one_layer_goes_into_every_format_as_by_the_driver() {
+    let host = host();
+    host.run("ogr2ogr", &["-f", "GPKG", "one.gpkg", "map.gpkg", "buildings", "-t_srs", "EPSG:4326"])
+        .succeeds();
+    for (format, ending) in
+        [("ESRI Shapefile", "shp"), ("FlatGeobuf", "fgb"), ("GeoJSON", "geojson"), ("GeoJSONSeq", "geojsonl")]
+    {
+        let options = ["--layers", "buildings", "--format", format];
+        distribute(&host, ending, "one.gpkg", &options, "2").succeeds();
+        let (recipient, stem) = RECIPIENTS[0];
+        let (driver, record) = (format!("driver.{ending}"), format!("RECORD={ending}.json"));
+        let subject = format!("RECIPIENT={recipient}");
+        host.run(
+            "ogr2ogr",
+            &[
+                "-f",
+                format,
+                &driver,
+                "MESHMARK:one.gpkg",
+                "-oo",
+                "KEY=key.json",
+                "-oo",
+                &subject,
+                "-oo",
+                "LAYERS=buildings",
+                "-oo",
+                &record,
+            ],
+        )
+        .succeeds();
+        let read = |name: &str| fs::read_to_string(host.path(name)).unwrap();
+        assert_eq!(read(&format!("{ending}/{stem}.json")), read(&format!("{ending}.json")));
+        let features = |name: &str| -> Vec<FeatureContents> {
+            contents::read(&host.path(name)).into_iter().flat_map(|layer| layer.features).collect()
+        };
+        assert!(features(&format!("{ending}/{stem}.{ending}")) == features(&driver), "{format}");
+    }
+    let refused = distribute(&host, "many", "map.gpkg", &["-f", "FlatGeobuf"], "2");
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("the map map.gpkg: FlatGeobuf holds one layer"), "{}", refused.stderr);
+    assert!(!host.path("many").exists());
+}
+
+#[test]
+fn one_thread_and_two_make_the_same_copies() {
+    let host = host();
+    for threads in ["1", "2"] {
+        distribute(&host, threads, "map.gpkg", &["--shape", "rigid"], threads).succeeds();
+    }
+    for (_, stem) in RECIPIENTS {
+        let read = |threads: &str, ending: &str| host.path(&format!("{threads}/{stem}.{ending}"));
+        assert_eq!(fs::read(read("1", "json")).unwrap(), fs::read(read("2", "json")).unwrap());
+        assert!(contents::read(&read("1", "gpkg")) == contents::read(&read("2", "gpkg")));
+    }
+}
+
+#[test]
+fn finished_copies_stay_and_what_is_none_is_refused() {
+    let host = host();
+    distribute(&host, "out", "map.gpkg", &[], "2").succeeds();
+    let [(_, acme), (_, oester)] = RECIPIENTS;
+    let (kept, gone) = (host.path(&format!("out/{acme}.gpkg")), host.path(&format!("out/{oester}.gpkg")));
+    let time = fs::metadata(&kept).unwrap().modified().unwrap();
+    fs::remove_file(&gone).unwrap();
+    let again = distribute(&host, "out", "map.gpkg", &[], "2").succeeds();
+    assert_eq!(again.stdout, "1 copy written to out, 1 copy there already\n");
+    assert!(gone.exists() && fs::metadata(&kept).unwrap().modified().unwrap() == time);
+
+    let refused = |more: &[&str], map: &str| {
+        let run = distribute(&host, "out", map, more, "2");
+        assert_eq!(run.code, Some(2), "{}", run.stderr);
+        assert_eq!(run.stderr.lines().count(), 1, "{}", run.stderr);
+        run.stderr
+    };
+    host.copy("helsinki.gpkg", "other.gpkg");
+    for (more, map) in [(&["--amplitude", "0.2"][..], "map.gpkg"), (&[], "other.gpkg")] {
+        let error = refused(more, map);
+        assert!(error.contains(&format!("{acme}.json is not the record of this map, key")), "{error}");
+    }
+    fs::remove_file(host.path(&format!("out/{acme}.json"))).unwrap();
+    let error = refused(&[], "map.gpkg");
+    assert!(error.contains(&format!("{acme}.gpkg is there and is no finished copy")), "{error}");
+    assert_eq!(fs::metadata(&kept).unwrap().modified().unwrap(), time);
+    assert!(refused(&[], "MESHMARK:map.gpkg").contains("is a marked view already"));
+}
+
+#[test]
+fn a_distribution_that_is_killed_or_has_no_disk_is_finished_by_the_next_run() {
+    for format in ["GPKG", "ESRI Shapefile"] {
+        let distribution = Distribution::new(format);
+        let calls = distribution.count_calls();
+        let mut seen = Vec::new();
+        for at in (0..5).map(|place| 1 + place * (calls - 1) / 4) {
+            for fault in [Fault::Kill(at), Fault::FullDisk(at)] {
+                distribution.reset();
+                seen.push(distribution.survives(fault));
+            }
+        }
+        assert!(seen.contains(&0) && seen.iter().any(|&copies| copies > 0), "{seen:?}");
+        for bytes in [4096, 81920] {
+            distribution.reset();
+            assert_eq!(distribution.survives(Fault::FileSize(bytes)), 0); // what ogr2ogr copies is larger
+        }
+        for seconds in [0.05, 0.2, 0.5] {
+            distribution.reset();
+            distribution.survives(Fault::KillAfter(seconds));
+        }
+    }
+}

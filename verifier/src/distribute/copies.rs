@@ -1,0 +1,139 @@
+//! The copies to make: what their files are called, and which are finished.
+
+use crate::{Error, Result};
+use meshmark_core::{
+    embedding::Marked,
+    key::SecretKey,
+    message::Message,
+    options::{Options, Subject},
+    record::{Record, Reference},
+};
+use meshmark_dataset::{formats::Format, marking};
+use sha2::{Digest, Sha256};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// The longest part of a file name that is made of the recipient, characters.
+const LONGEST_SLUG: usize = 40;
+
+/// A recipient's copy.
+pub struct Copy {
+    /// Who gets it.
+    pub recipient: String,
+    /// Its main file.
+    pub file: PathBuf,
+    /// Its record.
+    pub record: PathBuf,
+}
+
+impl Copy {
+    /// The copy for a recipient, in a folder.
+    pub fn new(recipient: String, folder: &Path, format: &Format) -> Self {
+        let stem = stem(&recipient);
+        let path = |ending: &str| folder.join(format!("{stem}{ending}"));
+        Copy { file: path(format.ending()), record: path(".json"), recipient }
+    }
+
+    /// The message in it.
+    pub fn message(&self, key: &SecretKey) -> Message {
+        self.subject().message(key)
+    }
+
+    /// What the mark says.
+    pub fn subject(&self) -> Subject {
+        Subject::Recipient(self.recipient.clone())
+    }
+
+    /// Whether file and record are there already, the record being that of this marking. Only then may anything be
+    /// where the copy goes.
+    pub fn is_finished(&self, options: &Options, key: &SecretKey, reference: &Reference) -> Result<bool> {
+        let remedy = "move it away, or give another --output-dir";
+        let refused =
+            |path: &Path, why: &str| Err(Error::Usage(format!("{} {why}: {remedy}", path.display())));
+        let has_record = self.record.symlink_metadata().is_ok();
+        if has_record && !self.is_record_of_this(options, key, reference) {
+            return refused(&self.record, "is not the record of this map, key, recipient and options");
+        }
+        if has_record && self.file.is_file() {
+            return Ok(true);
+        }
+        match self.in_the_way() {
+            Some(path) => refused(&path, "is there and is no finished copy"),
+            None => Ok(false),
+        }
+    }
+
+    /// Compares all that is known before the marking.
+    fn is_record_of_this(&self, options: &Options, key: &SecretKey, reference: &Reference) -> bool {
+        let text = fs::read_to_string(&self.record).ok();
+        let Some(found) = text.and_then(|text| Record::from_json(&text).ok()) else { return false };
+        let marked = Marked {
+            coords: Vec::new(),
+            patches: found.reference.patches,
+            displacement: found.displacement,
+            angles: found.angles,
+            junctions: found.topology.t_junctions,
+            attenuated: found.topology.attenuated_vertices,
+        };
+        let reference = Reference { patches: marked.patches, ..reference.clone() };
+        let expected = marking::record(options, &self.subject(), key, reference, &marked);
+        Record { software: found.software.clone(), ..expected } == found
+    }
+
+    /// A file that would be taken for a part of the copy.
+    fn in_the_way(&self) -> Option<PathBuf> {
+        let stem = self.record.with_extension("");
+        let start = format!("{}.", stem.file_name()?.to_str()?);
+        let is_part = |path: &PathBuf| {
+            *path != self.record
+                && path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&start))
+        };
+        let mut paths: Vec<PathBuf> =
+            fs::read_dir(stem.parent()?).ok()?.flatten().map(|entry| entry.path()).filter(is_part).collect();
+        paths.sort();
+        paths.into_iter().next()
+    }
+}
+
+/// A file name without ending: what can be read of the recipient, and 32 bits of a hash that tell apart those
+/// that read alike.
+fn stem(recipient: &str) -> String {
+    let mut slug = String::new();
+    for letter in recipient.chars().flat_map(char::to_lowercase) {
+        match letter.is_alphanumeric() {
+            true => slug.push(letter),
+            false if slug.ends_with('-') || slug.is_empty() => {}
+            false => slug.push('-'),
+        }
+    }
+    let slug: String = slug.chars().take(LONGEST_SLUG).collect();
+    let hash: String = Sha256::digest(recipient)[..4].iter().map(|byte| format!("{byte:02x}")).collect();
+    match slug.trim_end_matches('-') {
+        "" => hash,
+        slug => format!("{slug}-{hash}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_name_is_a_slug_and_a_hash() {
+        assert_eq!(stem("ACME GmbH"), "acme-gmbh-f384e512");
+        for (recipient, slug) in [
+            ("../../etc/passwd", "etc-passwd-"),
+            ("Ö & Søn", "ö-søn-"),
+            ("名古屋市", "名古屋市-"),
+            ("a\0\nb", "a-b-"),
+        ] {
+            let stem = stem(recipient);
+            assert!(stem.starts_with(slug) && stem.len() == slug.len() + 8, "{stem}");
+        }
+        assert_eq!(stem("!").len(), 8);
+        assert_ne!(stem("ACME GmbH"), stem("acme gmbh"));
+        assert!(stem(&"長い".repeat(500)).len() < 200);
+    }
+}

@@ -1,0 +1,239 @@
+//! Many recipients: one map, read and solved once, and a marked copy with its record for each of them.
+//!
+//! ```text
+//! map ──survey──> vertices ──core::embedding──> displacements of a batch of recipients
+//!  └──ogr2ogr──> staged GeoPackage ──a thread each──> copy ─> moved ─> read back ─> published with its record
+//! ```
+//!
+//! A copy that is there is complete; the same command again makes those that are not.
+
+mod copies;
+mod ogr2ogr;
+mod recipients;
+mod writing;
+
+use crate::{Error, Result, progress::Progress, reading};
+use copies::Copy;
+use meshmark_core::{
+    embedding::Embedding,
+    key::{RECIPIENT_BITS, SecretKey},
+    options::{Options, Spelling},
+    record::Reference,
+    vertices::VertexTable,
+};
+use meshmark_dataset::{
+    Error as MapError, Survey, formats::Format, marking, parse_srs, threads, workplace::Workplace,
+};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::{
+        Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+};
+
+/// What to distribute, to whom, and how it is marked.
+pub struct Request {
+    /// The key.
+    pub key: SecretKey,
+    /// The marking options, without a subject.
+    pub options: Options,
+    /// The map.
+    pub map: PathBuf,
+    /// The list of recipients.
+    pub recipients: PathBuf,
+    /// Where the copies go.
+    pub folder: PathBuf,
+    /// GDAL's short name of their format.
+    pub format: String,
+}
+
+/// What was done.
+pub struct Summary {
+    /// Copies that were written.
+    pub written: usize,
+    /// Copies that were there.
+    pub finished_before: usize,
+}
+
+/// What all copies are made of.
+struct Job<'a> {
+    key: &'a SecretKey,
+    options: &'a Options,
+    vertices: &'a VertexTable,
+    reference: Reference,
+    format: &'static Format,
+    /// The GeoPackage with the unmarked map.
+    staged: &'a Path,
+    folder: &'a Path,
+}
+
+impl Job<'_> {
+    fn marks_layer(&self, name: &str) -> bool {
+        self.options.layers.as_ref().is_none_or(|layers| layers.iter().any(|layer| layer == name))
+    }
+}
+
+/// Writes a marked copy and its record for every recipient who has none yet. `warn` hears of what is legal and
+/// probably not meant.
+pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnMut(&str)) -> Result<Summary> {
+    let Request { key, options, folder, .. } = request;
+    let format = Format::find(Some(&request.format), Path::new("")).map_err(Error::from)?;
+    let recipients = recipients::read(&request.recipients, warn)?;
+    let made = make_folder(folder)?;
+    let done = Workplace::new(folder).map_err(Error::from).and_then(|workplace| {
+        progress.start("reading", 0);
+        let map = reading::source(&request.map, options, warn)?;
+        let mut copies: Vec<Copy> =
+            recipients.into_iter().map(|recipient| Copy::new(recipient, folder, format)).collect();
+        let all = copies.len();
+        let reference = marking::reference(&map, 0);
+        let finished = copies.iter().map(|copy| copy.is_finished(options, key, &reference));
+        let finished: Vec<bool> = finished.collect::<Result<_>>()?;
+        let mut finished = finished.into_iter();
+        copies.retain(|_| !finished.next().expect("one of each"));
+        if !copies.is_empty() {
+            let staged = stage(request, format, &map, &workplace, progress)?;
+            run(request, &map, (format, &staged), &copies, progress, warn)?;
+        }
+        Ok(Summary { written: copies.len(), finished_before: all - copies.len() })
+    });
+    progress.finish();
+    if done.is_err() && made {
+        drop(fs::remove_dir(folder)); // unless something is in it
+    }
+    done
+}
+
+/// Makes the folder of the copies; whether it was not there.
+fn make_folder(folder: &Path) -> Result<bool> {
+    let is_there = folder.is_dir();
+    fs::create_dir_all(folder).map(|()| !is_there).map_err(|error| {
+        let folder = folder.display();
+        Error::Usage(format!("the output folder {folder} cannot be made ({error}): name one that can be"))
+    })
+}
+
+/// Copies the map to a GeoPackage, which is the source of all copies.
+fn stage(
+    request: &Request,
+    format: &'static Format,
+    map: &Survey,
+    workplace: &Workplace,
+    progress: &mut Progress,
+) -> Result<PathBuf> {
+    progress.start("copying", 0);
+    let staged = workplace.folder().join("staged.gpkg");
+    ogr2ogr::copy(
+        "GPKG",
+        &request.map,
+        &staged,
+        &["-lco", "SPATIAL_INDEX=NO", "-oo", reading::COLUMNS_OF_CSV],
+    )?;
+    let (again, layers) = reading::staged(&staged, &request.options)?;
+    if again.vertices.digest() != map.vertices.digest() {
+        return Err(Error::Unreadable(format!(
+            "the map {} has other coordinates as a GeoPackage, or was changed while it was read: convert it to a \
+             GeoPackage, and distribute that",
+            request.map.display()
+        )));
+    }
+    let driver = format.driver;
+    let refused = |error: MapError| {
+        Err(Error::Usage(format!("the map {}: {}", request.map.display(), error.text(Spelling::Flag))))
+    };
+    if layers.len() > 1 && !format.many_layers {
+        return refused(MapError::OneLayer { driver });
+    }
+    let is_wgs84 =
+        map.crs.as_ref().is_none_or(|crs| parse_srs("EPSG:4326").is_ok_and(|wgs84| crs.is_same(&wgs84)));
+    if let (true, false, Some(layer)) = (format.is_wgs84_only(&[]), is_wgs84, layers.into_iter().next()) {
+        return refused(MapError::NotWgs84 { driver, layer });
+    }
+    Ok(staged)
+}
+
+/// Marks and writes, batch by batch.
+fn run(
+    request: &Request,
+    survey: &Survey,
+    (format, staged): (&'static Format, &Path),
+    copies: &[Copy],
+    progress: &mut Progress,
+    warn: &mut dyn FnMut(&str),
+) -> Result<()> {
+    let Request { key, options, folder, .. } = request;
+    let of_map = |error| reading::failed("map", &request.map, error);
+    let map = survey.map().map_err(of_map)?;
+    let parameters = &options.parameters;
+    marking::check_extent(&map, parameters).map_err(of_map)?;
+    let threads = threads();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
+    progress.start("patches", 0);
+    let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters))?;
+    let message = copies[0].message(key);
+    let warnings = marking::warnings(parameters, &message, survey, embedding.patches(), Spelling::Flag);
+    warnings.iter().for_each(|text| warn(text));
+    let reference = marking::reference(survey, embedding.patches());
+    let job = Job { key, options, vertices: &survey.vertices, reference, format, staged, folder };
+    let mut written = 0;
+    for batch in copies.chunks(embedding.batch()) {
+        progress.start("solving patches", embedding.patches() as u64);
+        let messages: Vec<_> = batch.iter().map(|copy| copy.message(key)).collect();
+        let wanted = pool.install(|| embedding.wanted(&messages, &progress.stepper()))?;
+        progress.start("writing copies", batch.len() as u64);
+        let step = progress.stepper();
+        let todo = Mutex::new(batch.iter().zip(messages).zip(wanted));
+        let write_next = || {
+            let next = todo.lock().expect("nobody panics with it").next();
+            next.map(|((copy, message), wanted)| {
+                let marked = pool.install(|| embedding.settle(&message, &wanted)).map_err(Error::from);
+                drop(wanted);
+                let written = marked.and_then(|marked| writing::write(&job, copy, &marked));
+                written.map(|()| step(1)).map_err(|error| error.of(&copy.recipient))
+            })
+        };
+        written += in_parallel(threads.min(batch.len()), write_next).map_err(|(done, error)| {
+            let (done, all) = (written + done, copies.len());
+            error.with(&format!(
+                "; {done} of {all} copies were written, and the same command again makes the rest"
+            ))
+        })?;
+    }
+    Ok(())
+}
+
+/// Calls `step` on so many threads until it has nothing left to do: how often it succeeded. After an error no step
+/// begins.
+fn in_parallel(
+    threads: usize,
+    step: impl Fn() -> Option<Result<()>> + Sync,
+) -> std::result::Result<usize, (usize, Error)> {
+    let has_failed = AtomicBool::new(false);
+    let work = || {
+        let mut done = 0;
+        while !has_failed.load(Ordering::Relaxed) {
+            match step() {
+                None => break,
+                Some(Ok(())) => done += 1,
+                Some(Err(error)) => {
+                    has_failed.store(true, Ordering::Relaxed);
+                    return (done, Some(error));
+                }
+            }
+        }
+        (done, None)
+    };
+    let ended: Vec<(usize, Option<Error>)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().map(|worker| worker.join().expect("no worker panics")).collect()
+    });
+    let done = ended.iter().map(|(done, _)| done).sum();
+    match ended.into_iter().find_map(|(_, error)| error) {
+        None => Ok(done),
+        Some(error) => Err((done, error)),
+    }
+}

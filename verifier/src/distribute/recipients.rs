@@ -1,0 +1,146 @@
+//! The list of recipients: a CSV file with a header `recipient`, or of one column.
+
+use crate::{Error, Result};
+use csv::{ReaderBuilder, StringRecord, Trim};
+use std::{collections::BTreeSet, fs, path::Path};
+
+const HEADER: &str = "recipient";
+
+/// What spreadsheets put between columns.
+const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
+
+/// Reads the recipients in their order, each once, without blank lines; `warn` hears of those given again.
+pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
+    let name = path.display();
+    let bad = |what: String| Error::Usage(format!("the list of recipients {name} {what}"));
+    let bytes = fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes); // the byte order mark of spreadsheets
+    let rows = rows(text).map_err(&bad)?;
+    let column = match rows.first() {
+        None => return Err(bad("is empty: write one recipient a line".into())),
+        Some((_, first)) => first.iter().position(is_header),
+    };
+    if let (None, Some((line, row))) = (column, rows.iter().find(|(_, row)| row.len() > 1)) {
+        return Err(bad(format!(
+            "has {} columns in line {line} and no header \"{HEADER}\": name the column that, or put recipients that \
+             contain a comma in quotes",
+            row.len()
+        )));
+    }
+    let (mut seen, mut recipients) = (BTreeSet::new(), Vec::new());
+    for (line, row) in rows.iter().skip(usize::from(column.is_some())) {
+        let recipient = row.get(column.unwrap_or(0)).unwrap_or_default();
+        if recipient.is_empty() {
+            return Err(bad(format!("has no recipient in line {line}: fill it in, or remove the line")));
+        }
+        match seen.insert(recipient.to_string()) {
+            true => recipients.push(recipient.to_string()),
+            false => {
+                warn(&format!("{name}: \"{recipient}\" is there again in line {line}, and gets one copy"))
+            }
+        }
+    }
+    match recipients.is_empty() {
+        true => Err(bad("has a header and no recipient: write one a line".into())),
+        false => Ok(recipients),
+    }
+}
+
+fn is_header(field: &str) -> bool {
+    field.eq_ignore_ascii_case(HEADER)
+}
+
+/// Lines and what they hold, separated by what makes a header of the first one, else by commas.
+fn rows(text: &[u8]) -> std::result::Result<Vec<(usize, StringRecord)>, String> {
+    let all = DELIMITERS.map(|delimiter| rows_between(text, delimiter));
+    let has_header = |rows: &std::result::Result<Vec<(usize, StringRecord)>, String>| {
+        rows.as_ref().is_ok_and(|rows| rows.first().is_some_and(|(_, first)| first.iter().any(is_header)))
+    };
+    let chosen = all.iter().position(has_header).unwrap_or(0);
+    all.into_iter().nth(chosen).expect("it is one of them")
+}
+
+fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, StringRecord)>, String> {
+    let mut reader = ReaderBuilder::new();
+    let mut reader =
+        reader.has_headers(false).flexible(true).trim(Trim::All).delimiter(delimiter).from_reader(text);
+    // The reader counts a line before it skips the empty ones ahead of it.
+    let (mut counted, mut line) = (0, 1);
+    let mut line_at = |position: Option<&csv::Position>| {
+        let start = position.map_or(0, |at| at.byte() as usize);
+        let empty = text[start..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
+        line += text[counted..start + empty].iter().filter(|byte| **byte == b'\n').count();
+        counted = start + empty;
+        line
+    };
+    let mut rows = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|error| match error.position() {
+            Some(at) => format!("is not UTF-8 in line {}: save it as UTF-8", line_at(Some(at))),
+            None => format!("cannot be read: {error}"),
+        })?;
+        if !row.iter().all(str::is_empty) {
+            rows.push((line_at(row.position()), row));
+        }
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The recipients, and the warnings or the error.
+    fn parse(text: &[u8]) -> (Vec<String>, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.csv");
+        fs::write(&path, text).unwrap();
+        let mut warnings = String::new();
+        match read(&path, &mut |text| warnings.push_str(text)) {
+            Ok(recipients) => (recipients, warnings),
+            Err(error) => (Vec::new(), error.to_string()),
+        }
+    }
+
+    #[test]
+    fn a_list_has_a_header_or_one_column() {
+        for text in [
+            "ACME GmbH\nÖster AB\n",
+            "recipient\r\nACME GmbH\r\n\r\n  Öster AB  \r\n",
+            "\u{feff}Recipient\nACME GmbH\nÖster AB",
+            "id,recipient\n1,ACME GmbH\n2,\"Öster AB\"\n",
+            "id;recipient;note\n1;ACME GmbH;a, b\n;;\n2;Öster AB\n",
+            "recipient\tid\nACME GmbH\t1\nÖster AB\t2\n",
+        ] {
+            assert_eq!(
+                parse(text.as_bytes()),
+                (vec!["ACME GmbH".into(), "Öster AB".into()], String::new()),
+                "{text}"
+            );
+        }
+        assert_eq!(parse(b"\"ACME, Inc.\"\n").0, ["ACME, Inc."]);
+    }
+
+    #[test]
+    fn a_recipient_given_again_gets_one_copy_and_a_warning() {
+        let (recipients, warning) = parse(b"A\n\nB\nA \na\n");
+        assert_eq!(recipients, ["A", "B", "a"]);
+        assert!(warning.contains("\"A\" is there again in line 4"), "{warning}");
+    }
+
+    #[test]
+    fn what_is_no_list_is_refused_by_its_line() {
+        for (text, error) in [
+            (&b""[..], "is empty"),
+            (b"\n\n", "is empty"),
+            (b"recipient\n", "has a header and no recipient"),
+            (b"A\nACME, Inc.\n", "2 columns in line 2 and no header \"recipient\""),
+            (b"name,id\nA,1\n", "2 columns in line 1"),
+            (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
+            (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
+        ] {
+            let (_, found) = parse(text);
+            assert!(found.contains(error), "{}: {found}", String::from_utf8_lossy(text));
+        }
+    }
+}
