@@ -76,6 +76,7 @@ hosts: build plugin-for-wheel
 	host-tests/hosts/qgis.sh
 	host-tests/hosts/qgis_plugin.sh
 	host-tests/hosts/chromium.sh
+	host-tests/hosts/wheel.sh
 	host-tests/hosts/examples.sh
 	host-tests/hosts/deb.sh
 
