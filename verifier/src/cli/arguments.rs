@@ -1,0 +1,225 @@
+//! Subcommands and their flags; those of the marking options are made from the one table.
+
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand};
+use meshmark_core::options::{OPTIONS, Spelling};
+use meshmark_verifier::{Demodulator, ExitCode, registration::Start};
+use std::path::PathBuf;
+
+const MARKING: &str = "Maps are marked by GDAL's ogr2ogr: ogr2ogr -f GPKG marked.gpkg MESHMARK:map.gpkg \
+                       -oo KEY=key.json -oo RECIPIENT=\"ACME GmbH\" -oo RECORD=acme.json";
+
+/// Watermarks of vector maps: make a key, verify a suspect map.
+#[derive(Parser)]
+#[command(name = "meshmark", version, subcommand_required = true, arg_required_else_help = true,
+          after_help = MARKING)]
+pub(super) struct Cli {
+    #[command(subcommand)]
+    pub(super) command: Subcommands,
+}
+
+#[derive(Subcommand)]
+pub(super) enum Subcommands {
+    /// Make a secret key and write it to a new file that only you can read
+    Keygen {
+        /// The file to write; it must not exist
+        key_file: PathBuf,
+    },
+    /// Say whether a suspect map carries a mark
+    #[command(long_about = about_verify())]
+    Verify(Box<VerifyArgs>),
+    /// Say what marking did to a map: displacement, angles, areas, topology
+    ///
+    /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
+    /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large.
+    Compare(CompareArgs),
+    /// Write a marked copy of a map, and its record, for every recipient of a list
+    ///
+    /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears when it is complete, was
+    /// read back and carries its message; the same command again skips those that are there. Exit codes: 0 all copies
+    /// are there, 2 usage, or a copy that could not be written, 5 unreadable map, 6 too large.
+    Distribute(Box<DistributeArgs>),
+    /// Write man pages and shell completions, for those who make packages
+    #[command(hide = true)]
+    PackageFiles {
+        /// The folder to write them to
+        folder: PathBuf,
+    },
+}
+
+#[derive(Args)]
+pub(super) struct DistributeArgs {
+    /// Key file made by `meshmark keygen`
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: PathBuf,
+    /// List of the recipients, CSV
+    #[arg(long, value_name = "FILE")]
+    pub(super) recipients: PathBuf,
+    /// Folder for the copies and their records; made when it is not there
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) output_dir: PathBuf,
+    /// Format of the copies, by GDAL's short name: GPKG, "ESRI Shapefile", FlatGeobuf, GeoJSON, GeoJSONSeq
+    #[arg(short, long, default_value = "GPKG")]
+    pub(super) format: String,
+    /// The map, unmarked; keep it, it is the reference of all copies
+    pub(super) map: PathBuf,
+    #[command(flatten)]
+    pub(super) marking: DistributeFlags,
+}
+
+#[derive(Args)]
+pub(super) struct CompareArgs {
+    /// The map as it was before marking
+    pub(super) reference: PathBuf,
+    /// The marked map
+    pub(super) marked: PathBuf,
+    /// Comma-separated layers to compare; all by default
+    #[arg(long, value_delimiter = ',')]
+    pub(super) layers: Vec<String>,
+    /// Grid of the marked map, CRS units: overlaps up to a cell of it count as slivers
+    #[arg(long)]
+    pub(super) precision: Option<f64>,
+    /// Print the comparison as one JSON object
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Write a report to read and print (.html), or to process (.json); the file must not exist
+    #[arg(long, value_name = "FILE")]
+    pub(super) report: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(super) struct VerifyArgs {
+    /// Key file made by `meshmark keygen`
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: PathBuf,
+    /// The map as it was before marking
+    #[arg(long, value_name = "MAP")]
+    pub(super) reference: PathBuf,
+    /// Record the driver wrote when it marked the map
+    #[arg(long, value_name = "FILE")]
+    pub(super) record: Option<PathBuf>,
+    /// Folder of records (*.json): which of their recipients' copies is it?
+    #[arg(long, value_name = "FOLDER", conflicts_with = "record")]
+    pub(super) records: Option<PathBuf>,
+    /// The map in question
+    pub(super) suspect: PathBuf,
+    /// Field of the reference to find landmarks by, matched with any field of the suspect by value; repeatable,
+    /// all string and integer fields by default
+    #[arg(long, value_name = "FIELD")]
+    pub(super) landmark: Vec<String>,
+    /// How to bring the suspect onto the reference
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(super) registration: Start,
+    /// How to demodulate
+    #[arg(long, value_enum, default_value = "joint")]
+    pub(super) demodulator: Demodulator,
+    /// Radius within which vertices match, metres on the ground
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = positive, allow_negative_numbers = true)]
+    pub(super) radius: f64,
+    /// The verdict is match when the p-value is below this
+    #[arg(long, value_name = "P", default_value_t = 1e-6, value_parser = probability, allow_negative_numbers = true)]
+    pub(super) significance: f64,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Say in sentences what was compared, found and not tested
+    #[arg(long, conflicts_with = "json")]
+    pub(super) explain: bool,
+    /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with their scores
+    #[arg(long, value_name = "FILE")]
+    pub(super) evidence_map: Option<PathBuf>,
+    /// Write a report to read and print (.html), or to process (.json); the file must not exist
+    #[arg(long, value_name = "FILE")]
+    pub(super) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) marking: MarkingFlags,
+}
+
+/// The marking options as flags of `verify`, from the one table.
+pub(super) struct MarkingFlags(pub(super) Vec<(&'static str, String)>);
+
+/// Those of `distribute`, whose subjects are in its list.
+pub(super) struct DistributeFlags(pub(super) Vec<(&'static str, String)>);
+
+const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
+
+/// A flag for every option that shapes the mark.
+fn flags(heading: &'static str) -> impl Iterator<Item = Arg> {
+    OPTIONS.iter().filter(|option| option.shapes_mark).map(move |option| {
+        let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
+        Arg::new(option.name)
+            .long(Spelling::Flag.name(option.name)[2..].to_string())
+            .value_name(option.name)
+            .allow_negative_numbers(true)
+            .help_heading(heading)
+            .help(format!("{}{default}", option.help))
+    })
+}
+
+/// What was given of them.
+fn given(matches: &ArgMatches) -> Vec<(&'static str, String)> {
+    let value = |name: &'static str| Some((name, matches.try_get_one::<String>(name).ok()??.clone()));
+    OPTIONS.iter().filter_map(|option| value(option.name)).collect()
+}
+
+impl Args for MarkingFlags {
+    fn augment_args(command: Command) -> Command {
+        let heading = "How the map was marked (taken from the record when there is one)";
+        command.args(flags(heading).map(|flag| flag.conflicts_with("records")))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for MarkingFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        Ok(MarkingFlags(given(matches)))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for DistributeFlags {
+    fn augment_args(command: Command) -> Command {
+        let is_subject = |flag: &Arg| SUBJECTS.iter().any(|subject| flag.get_id() == subject);
+        command.args(flags("How the map is marked").filter(|flag| !is_subject(flag)))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for DistributeFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        Ok(DistributeFlags(given(matches)))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("give a number greater than 0".into()),
+    }
+}
+
+fn probability(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err("give a number between 0 and 1".into()),
+    }
+}
+
+fn about_verify() -> String {
+    let codes = ExitCode::ALL.map(|code| format!("{} {}", code as u8, code.meaning())).join(", ");
+    format!("Say whether a suspect map carries a mark\n\nExit codes: {codes}.")
+}

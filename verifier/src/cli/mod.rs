@@ -1,0 +1,159 @@
+//! The command line: flags in, exit code out.
+
+mod arguments;
+mod request;
+
+use crate::package_files;
+use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands, VerifyArgs};
+use clap::{CommandFactory, Parser};
+use meshmark_core::{key::SecretKey, options::Options};
+use meshmark_verifier::{
+    Error, ExitCode, Result,
+    candidates::verify_candidates,
+    compare::{Comparison, compare, detail::Compared},
+    distribute,
+    evidence::{self, Provenance},
+    evidence_map::Target,
+    html,
+    inputs::Inputs,
+    progress::Progress,
+    reading,
+    report::Report,
+    report_file::{Format, ReportFile},
+    verify,
+};
+use request::request;
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// Runs the command of this process.
+pub fn run() -> ExitCode {
+    reading::quieten_gdal();
+    let result = match Cli::parse().command {
+        Subcommands::Keygen { key_file } => keygen(&key_file),
+        Subcommands::Verify(args) => run_verify(*args),
+        Subcommands::Compare(args) => run_compare(&args),
+        Subcommands::PackageFiles { folder } => write_package_files(&folder),
+        Subcommands::Distribute(args) => run_distribute(*args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("meshmark: {error}");
+        error.exit_code()
+    })
+}
+
+fn keygen(path: &PathBuf) -> Result<ExitCode> {
+    let mut secret = zeroize::Zeroizing::new([0; 32]);
+    getrandom::fill(secret.as_mut_slice())
+        .map_err(|error| Error::Usage(format!("the operating system gives no random bytes: {error}")))?;
+    let key = SecretKey::from_bytes(*secret);
+    let failed = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::AlreadyExists => Error::Usage(format!(
+            "{} exists, and a key is never overwritten: name another file",
+            path.display()
+        )),
+        _ => Error::Usage(format!("the key file {} cannot be written: {error}", path.display())),
+    };
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.open(path).map_err(failed)?;
+    let written = file.write_all(key.to_json().as_bytes()).and_then(|()| file.sync_all());
+    if let Err(error) = written {
+        let _ = std::fs::remove_file(path); // half a key is worse than none
+        return Err(failed(error));
+    }
+    println!("key {} written to {}", key.id(), path.display());
+    Ok(ExitCode::Match)
+}
+
+fn write_package_files(folder: &Path) -> Result<ExitCode> {
+    package_files::write(Cli::command(), folder).map_err(|error| {
+        Error::Usage(format!("man pages and completions cannot be written to {}: {error}", folder.display()))
+    })?;
+    Ok(ExitCode::Match)
+}
+
+fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
+    let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
+    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
+    let provenance =
+        file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
+    let mut comparison = compare(&args.reference, &args.marked, layers, args.precision, file.is_some())?;
+    let detail = comparison.detail.take(); // a report file has it
+    print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
+    if let Some((file, mut detail)) = file.zip(detail) {
+        detail.provenance = provenance;
+        let comparison = Comparison { detail: Some(detail), ..comparison };
+        file.write(&match file.format() {
+            Format::Html => html::comparison(&comparison),
+            Format::Json => comparison.to_json(),
+        })?;
+    }
+    Ok(ExitCode::Match)
+}
+
+fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
+    let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
+    let request = distribute::Request {
+        options: Options::parse(flags)?,
+        key: reading::key(&args.key)?,
+        map: args.map,
+        recipients: args.recipients,
+        folder: args.output_dir,
+        format: args.format,
+    };
+    let mut warn = |text: &str| eprintln!("meshmark: {text}");
+    let done = distribute::distribute(&request, &mut Progress::default(), &mut warn)?;
+    let copies = |count| if count == 1 { "1 copy".into() } else { format!("{count} copies") };
+    let before = match done.finished_before {
+        0 => String::new(),
+        count => format!(", {} there already", copies(count)),
+    };
+    println!("{} written to {}{before}", copies(done.written), request.folder.display());
+    Ok(ExitCode::Match)
+}
+
+fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
+    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
+    let evidence_map = args.evidence_map.as_deref().map(Target::new).transpose()?;
+    let wanted = args.explain || file.is_some();
+    let inputs = wanted.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
+    let (json, explain) = (args.json, args.explain);
+    let (records, record) = (args.records.clone(), args.record.clone());
+    let request = request(args)?;
+    let mut progress = Progress::default();
+    let mut warn = |text: &str| eprintln!("meshmark: {text}");
+    let mut report = match &records {
+        Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
+        None => verify(&request, &mut progress)?,
+    };
+    if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
+        map.write(&target)?;
+    }
+    let evidence = report.evidence.take(); // a report file has it
+    print!("{}", if json { report.to_json() } else { report.to_text() });
+    let Some(inputs) = inputs else { return Ok(report.exit_code()) };
+    let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
+    let inputs = inputs.with_record(record.or_else(best).as_deref())?;
+    if explain {
+        print!("\n{}", inputs.explain(&report));
+    }
+    if let Some(file) = file {
+        let provenance = Provenance::new(&report, inputs, command_line());
+        let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
+        file.write(&match file.format() {
+            Format::Html => html::verification(&report),
+            Format::Json => report.to_json(),
+        })?;
+    }
+    Ok(report.exit_code())
+}
+
+/// That of this process.
+fn command_line() -> String {
+    evidence::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
+}

@@ -1,0 +1,89 @@
+//! What `verify` is to do: flags, key and record put together.
+
+use super::arguments::VerifyArgs;
+use meshmark_core::{
+    key::RECIPIENT_BITS,
+    message::Message,
+    options::{Options, Spelling, Subject},
+    record::Record,
+};
+use meshmark_verifier::{Error, Request, Result, reading, verify::check_key};
+
+/// Puts key, record and flags together.
+pub(super) fn request(args: VerifyArgs) -> Result<Request> {
+    let key = reading::key(&args.key)?;
+    let record = args.record.as_deref().map(reading::record).transpose()?;
+    let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
+    let options = Options::parse(flags)?;
+    let options = match &record {
+        Some(record) => {
+            check_flags(&args.marking.0, record)?;
+            check_key(record, &key)?;
+            from_record(record)?
+        }
+        None => options,
+    };
+    let expected = options.subject.as_ref().map(|subject| subject.message(&key));
+    Ok(Request {
+        bits: expected.as_ref().map_or(RECIPIENT_BITS, Message::len),
+        recipient: options.subject.and_then(|subject| match subject {
+            Subject::Recipient(text) => Some(text),
+            Subject::Message(_) => None,
+        }),
+        expected,
+        key,
+        reference: args.reference,
+        suspect: args.suspect,
+        record,
+        parameters: options.parameters,
+        layers: options.layers,
+        srs: options.srs,
+        landmarks: args.landmark,
+        registration: args.registration,
+        demodulator: args.demodulator,
+        radius_m: args.radius,
+        significance: args.significance,
+        sketch: args.report.is_some(),
+        evidence_map: args.evidence_map.is_some(),
+    })
+}
+
+/// The options a record was made with.
+fn from_record(record: &Record) -> Result<Options> {
+    Ok(Options {
+        key_path: None,
+        subject: Some(record.subject()?),
+        parameters: record.parameters()?,
+        layers: record.layers.clone(),
+        srs: record.srs.clone(),
+        record_path: None,
+    })
+}
+
+/// A flag may repeat what the record says, not contradict it.
+fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> {
+    let recorded = from_record(record)?;
+    for (name, value) in flags {
+        let alone = Options::parse([(*name, value.as_str())])?;
+        let agrees = match *name {
+            "RECIPIENT" => alone.subject == recorded.subject,
+            "MESSAGE" => matches!(&alone.subject, Some(Subject::Message(m)) if *m == record.message()?),
+            "AMPLITUDE" => alone.parameters.amplitude_m == recorded.parameters.amplitude_m,
+            "CODE" => alone.parameters.code == recorded.parameters.code,
+            "CHIP_RATE" => alone.parameters.chip_rate == recorded.parameters.chip_rate,
+            "PATCH_SIZE" => alone.parameters.patch_size == recorded.parameters.patch_size,
+            "TOLERANCE" => alone.parameters.tolerance_m == recorded.parameters.tolerance_m,
+            "SHAPE" => alone.parameters.shape == recorded.parameters.shape,
+            "BASIS" => alone.parameters.laplacian == recorded.parameters.laplacian,
+            "PRECISION" => alone.parameters.precision == recorded.parameters.precision,
+            "LAYERS" => alone.layers == recorded.layers,
+            "SRS" => alone.srs == recorded.srs,
+            other => unreachable!("{other} does not shape the mark"),
+        };
+        if !agrees {
+            let flag = Spelling::Flag.value(name, value);
+            return Err(Error::Usage(format!("{flag} contradicts the record: leave one of them out")));
+        }
+    }
+    Ok(())
+}
