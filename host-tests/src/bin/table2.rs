@@ -26,6 +26,9 @@ struct Arguments {
     /// Only the attacks of the paper, only chip rate 2
     #[arg(long)]
     quick: bool,
+    /// Repetition with these chip rates, instead of 2, 3 and LDPC
+    #[arg(long, value_delimiter = ',')]
+    chip_rates: Vec<usize>,
     /// Only these rows, for example 6,9c,dp0.5
     #[arg(long, value_delimiter = ',')]
     rows: Vec<String>,
@@ -72,9 +75,10 @@ fn run_all(arguments: Arguments) -> Result<()> {
     };
     let plan = Plan {
         maps: geopackages(&arguments.maps)?,
-        profiles: match quick {
-            true => vec![Profile::repetition(2)],
-            false => vec![Profile::repetition(2), Profile::repetition(3), Profile::LDPC],
+        profiles: match (quick, arguments.chip_rates.as_slice()) {
+            (true, []) => vec![Profile::repetition(2)],
+            (false, []) => vec![Profile::repetition(2), Profile::repetition(3), Profile::LDPC],
+            (_, rates) => rates.iter().map(|rate| Profile::repetition(*rate)).collect(),
         },
         wanted: Box::new(wanted),
         seed: arguments.seed,
