@@ -12,7 +12,7 @@ use std::{
     ffi::{OsStr, OsString},
     fs::{self, File},
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
 };
 use tempfile::TempDir;
 
@@ -173,7 +173,7 @@ impl<'a> Work<'a> {
             "--output-dir",
             "copies",
         ]);
-        let run = self.run(command.arg(self.map), &[0])?;
+        let run = self.run(command.arg(self.map).stdout(Stdio::null()), &[0])?;
         fs::remove_dir_all(self.path("copies"))?;
         Ok(run)
     }
