@@ -24,7 +24,8 @@ pub struct FeatureGeometry {
 /// without one are left out. `last_failure` is as in [`crate::Selection`].
 ///
 /// # Errors
-/// A layer that does not exist or cannot be read to its end, or a geometry that makes no sense.
+/// A layer that does not exist or cannot be read to its end, a geometry that makes no sense, coordinates that are not
+/// finite.
 pub fn features(
     dataset: &Dataset,
     layers: Option<&[String]>,
@@ -38,13 +39,13 @@ pub fn features(
             for column in 0..columns {
                 let Ok(geometry) = feature.geometry_by_index(column) else { continue }; // a null geometry
                 let fid = feature.fid();
-                let failed = |reason: String| Error::Geometry {
-                    layer: name.clone(),
-                    fid: fid.map_or("without id".into(), |fid| fid.to_string()),
-                    reason,
-                };
+                let id = || fid.map_or("without id".into(), |fid| fid.to_string());
+                let failed = |reason: String| Error::Geometry { layer: name.clone(), fid: id(), reason };
                 let mut wkb = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
                 let chains = chains(&mut wkb).map_err(|error| failed(error.to_string()))?;
+                if let Some(&[x, y]) = chains.iter().flatten().find(|p| !p.iter().all(|v| v.is_finite())) {
+                    return Err(Error::NotFinite { layer: name.clone(), fid: id(), x, y });
+                }
                 all.push(FeatureGeometry { layer: name.clone(), fid, wkb, chains });
             }
         }

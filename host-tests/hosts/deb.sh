@@ -10,7 +10,7 @@ as_root=()
 package=$("$root/packaging/deb.sh" "$build" "$work/package")
 clean=$work/root
 trap '"${as_root[@]}" rm -rf "$work"' EXIT
-mirror=$(apt-get indextargets --format '$(SITE)' 'Codename: bookworm' 'Created-By: Packages' 2>/dev/null | grep -v security | head -n 1)
+mirror=$(apt-get indextargets --format '$(SITE)' 'Codename: bookworm' 'Created-By: Packages' 2>/dev/null | grep -v security | head -n 1) || true
 "${as_root[@]}" debootstrap --variant=minbase bookworm "$clean" ${mirror:+"$mirror"} >"$work/log" 2>&1 ||
     fail "debootstrap: $(tail -n 5 "$work/log")"
 "${as_root[@]}" cp "$package" "$fixture" "$clean/root/"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs every example and verifies what it made. Installs Python's GDAL, MapServer and PostGIS where they are missing; the
-# driver for pyogrio's wheel is that of `make plugin-for-wheel`.
+# Runs the examples and verifies what they made; postgis.sh runs that of PostGIS. Installs Python's GDAL and MapServer where
+# they are missing; the driver for pyogrio's wheel is that of `make plugin-for-wheel`.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 examples=$root/examples
@@ -28,6 +28,7 @@ for sheet in kotka helsinki; do
     verify "mark_folder.sh" "marked/$sheet.reference.gpkg" "marked/$sheet.gpkg" --record "marked/$sheet.json"
 done
 run "mark_folder.sh again" "$examples/mark_folder.sh" sheets key.json "ACME GmbH" marked
+! "$examples/mark_folder.sh" sheets key.json "ACME GmbH" sheets/. 2>"$work/log" || fail "mark_folder.sh takes sheets for copies"
 
 cp "$examples/mapserver.map" .
 printf 'CONFIG\n  ENV\n    MS_MAP_PATTERN "."\n  END\nEND\n' >mapserver.conf

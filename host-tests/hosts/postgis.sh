@@ -74,7 +74,7 @@ grep -q 'FORMAT=PostgreSQL is not a format that a marked map is written to' "$wo
 [ "$(tables)" -eq "$before" ] && [ ! -e second.gpkg ] || fail "a refused target was written to"
 passed "PostgreSQL is refused as a target"
 
-printf 'ACME GmbH\nBeta Oy\n' >recipients.txt
+printf 'ACME GmbH\nBeta Oy' >recipients.txt
 "$root/examples/postgis_recipients.sh" "$connection" buildings key.json recipients.txt copies >"$work/log" 2>&1 ||
     fail "postgis_recipients.sh: $(cat "$work/log")"
 for number in 1 2; do

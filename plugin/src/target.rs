@@ -147,7 +147,7 @@ fn folder(path: &Path) -> &Path {
 /// The absolute path of a file that is there, links followed, or that can be made.
 fn place(path: &Path) -> Result<PathBuf> {
     let refused = |what| Err(Error::NotAFile { path: path.display().to_string(), what });
-    if path.starts_with("/vsimem") || path.to_string_lossy().starts_with("/vsi") {
+    if path.to_string_lossy().starts_with("/vsi") {
         return refused("a virtual file");
     }
     if path.symlink_metadata().is_ok() {

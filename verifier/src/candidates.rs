@@ -201,14 +201,8 @@ fn examine_group(
     progress: &mut Progress,
     skip: &mut dyn FnMut(&str, String),
 ) -> Result<Option<(Group, Examination)>> {
-    let reference = match read_reference(&group.request, progress) {
-        Ok(reference) => reference,
-        Err(Error::Usage(reason)) => {
-            group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.clone()));
-            return Ok(None);
-        }
-        Err(other) => return Err(other),
-    };
+    let reference = read_reference(&group.request, progress);
+    let Some(reference) = or_skip(reference, &group, skip)? else { return Ok(None) };
     let digest = reference.vertices.digest();
     group.candidates.retain(|candidate| {
         let checked = check_reference(&candidate.record, &group.request, &reference, &digest);
@@ -220,8 +214,24 @@ fn examine_group(
     if group.candidates.is_empty() {
         return Ok(None);
     }
-    let seen = examine(&group.request, &reference, progress)?;
-    Ok(Some((group, seen)))
+    let seen = examine(&group.request, &reference, progress);
+    Ok(or_skip(seen, &group, skip)?.map(|seen| (group, seen)))
+}
+
+/// What does not fit the reference is wrong in the records.
+fn or_skip<T>(
+    result: Result<T>,
+    group: &Group,
+    skip: &mut dyn FnMut(&str, String),
+) -> Result<Option<T>> {
+    match result {
+        Ok(done) => Ok(Some(done)),
+        Err(Error::Usage(reason)) => {
+            group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.clone()));
+            Ok(None)
+        }
+        Err(other) => Err(other),
+    }
 }
 
 /// Decides on every candidate; the best comes first.

@@ -7,6 +7,7 @@ use crate::{
     Result,
     reading::{self, Reading, Suspect},
     registration::{ReadAs, Registrar, Registration, Side, Start},
+    report::printable,
 };
 use meshmark_dataset::{Assumption, Survey, likely_assumptions, overlaps};
 use std::path::Path;
@@ -88,8 +89,10 @@ fn in_place(
 
 impl Registered {
     fn new(map: Survey, assumption: Option<&Assumption>, registration: Registration) -> Self {
-        let read_as =
-            assumption.map(|assumed| ReadAs { crs: assumed.crs.label(), axes_swapped: assumed.axes_swapped });
+        let read_as = assumption.map(|assumed| ReadAs {
+            crs: printable(&assumed.crs.label()),
+            axes_swapped: assumed.axes_swapped,
+        });
         Registered { map, registration: Registration { read_as, ..registration } }
     }
 

@@ -71,8 +71,10 @@ pub(crate) fn versions() -> Vec<String> {
 pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
     let mut words = vec!["meshmark".to_string()];
     let mut arguments = arguments.skip(1);
+    let mut files = Vec::new(); // after "--" nothing is an option
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
+            "--" => files = std::iter::once("--".into()).chain(arguments.by_ref()).map(|w| quoted(&w)).collect(),
             "--report" | "--evidence-map" => drop(arguments.next()),
             "--json" | "--explain" => {}
             word if word.starts_with("--report=") || word.starts_with("--evidence-map=") => {}
@@ -80,6 +82,7 @@ pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
         }
     }
     words.extend(["--report".into(), "report.html".into()]);
+    words.extend(files);
     words.join(" ")
 }
 
@@ -112,6 +115,10 @@ mod tests {
                 "--report=b.html"
             ]),
             r"meshmark verify 'it'\''s Ä map.gpkg' --report report.html"
+        );
+        assert_eq!(
+            of(&["meshmark", "compare", "--report", "a.html", "--", "--json", "-b.gpkg"]),
+            "meshmark compare --report report.html -- --json -b.gpkg"
         );
     }
 }

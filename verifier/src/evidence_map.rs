@@ -7,8 +7,11 @@ use gdal::{
 };
 use meshmark_core::{carrier::Carrier, demodulation::Demodulation, patches::Patch};
 use meshmark_dataset::CoordinateSystem;
-use std::path::{Path, PathBuf};
-use tempfile::TempDir;
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
+use tempfile::{TempDir, TempPath};
 
 /// Equal evidence makes equal bytes: a GeoPackage holds the time of its last change.
 const NO_TIME: &str = "1970-01-01T00:00:00.000Z";
@@ -95,10 +98,11 @@ impl EvidenceMap {
         let failed = |reason: String| target.failed(&reason);
         let staged = target.workplace.path().join("map.gpkg");
         self.write_layers(&staged).map_err(|error| failed(error.to_string()))?;
-        if target.path.exists() {
-            return Err(target.exists());
-        }
-        std::fs::rename(&staged, &target.path).map_err(|error| failed(error.to_string()))
+        let staged = TempPath::try_from_path(staged).map_err(|error| failed(error.to_string()))?;
+        staged.persist_noclobber(&target.path).map_err(|error| match error.error.kind() {
+            ErrorKind::AlreadyExists => target.exists(),
+            _ => failed(error.error.to_string()),
+        })
     }
 
     fn write_layers(&self, path: &Path) -> gdal::errors::Result<()> {
@@ -198,7 +202,7 @@ impl Target {
         let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder);
         let workplace = workplace.map_err(|error| unwritable(path, &error.to_string()))?;
         let target = Target { path: path.into(), workplace };
-        if target.path.exists() { Err(target.exists()) } else { Ok(target) }
+        if target.path.symlink_metadata().is_ok() { Err(target.exists()) } else { Ok(target) }
     }
 
     fn exists(&self) -> Error {

@@ -1,6 +1,6 @@
 //! Reading: key, record, reference and suspect, with errors that name the file.
 
-use crate::{Error, Result};
+use crate::{Error, Result, report::printable};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{
     ground::Ground,
@@ -305,8 +305,8 @@ fn is_plain(sql: &str) -> bool {
 
 fn crs_of(dataset: &Dataset) -> Vec<String> {
     let label = |layer: gdal::vector::Layer| {
-        let crs = layer.spatial_ref().and_then(CoordinateSystem::of_layer).map(|crs| crs.label());
-        crs.unwrap_or_else(|| "no CRS".into())
+        let crs = layer.spatial_ref().and_then(CoordinateSystem::of_layer);
+        crs.map(|crs| printable(&crs.label())).unwrap_or_else(|| "no CRS".into())
     };
     dataset.layers().map(label).collect::<BTreeSet<_>>().into_iter().collect()
 }

@@ -8,7 +8,7 @@ use meshmark_core::key::SecretKey;
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
 };
 
 const MESHMARK: &str = env!("CARGO_BIN_EXE_meshmark");
@@ -117,6 +117,23 @@ fn only_its_owner_can_read_a_new_key_and_no_two_keys_are_equal() {
         SecretKey::from_json(&fs::read_to_string(&path).unwrap()).unwrap().id()
     };
     assert_ne!(make("a.json"), make("b.json"));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_answer_may_stay_unread_and_says_when_it_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let keygen = |name: &str, stdout: Stdio| {
+        let mut command = Command::new(MESHMARK);
+        let output = command.arg("keygen").arg(folder.path().join(name)).stdout(stdout).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    assert_eq!(keygen("a.json", writer.into()), (Some(0), String::new()));
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let (code, error) = keygen("b.json", full.into());
+    assert!(code == Some(2) && error.starts_with("meshmark: the answer cannot be printed: "), "{error}");
 }
 
 #[test]

@@ -4,16 +4,16 @@ use gdal::{Dataset, vector::LayerAccess};
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Output},
 };
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
 }
 
-/// Writes the map of the evidence in `suspect` and gives the numbers of vertices that the report names.
-fn verify(suspect: &Path, map: &Path) -> [u64; 2] {
-    let output = Command::new(env!("CARGO_BIN_EXE_meshmark"))
+/// Writes the map of the evidence in `suspect`.
+fn run(suspect: &Path, map: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_meshmark"))
         .args(["verify", "--json", "--key"])
         .arg(fixture("vectors/key.json"))
         .arg("--record")
@@ -24,7 +24,12 @@ fn verify(suspect: &Path, map: &Path) -> [u64; 2] {
         .arg(map)
         .arg(suspect)
         .output()
-        .unwrap();
+        .unwrap()
+}
+
+/// The same, and the numbers of vertices that the report names.
+fn verify(suspect: &Path, map: &Path) -> [u64; 2] {
+    let output = run(suspect, map);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));
     ["matched", "reference"].map(|name| report["vertices"][name].as_u64().unwrap())
@@ -78,4 +83,14 @@ fn a_suspect_that_is_elsewhere_makes_patches_without_vertices() {
     let [patches, found, scores] = numbers(&map, "SELECT count(*), sum(found), count(score) FROM patches");
     assert!(patches > 0.0 && found == 0.0 && scores == 0.0);
     assert_eq!(numbers(&map, "SELECT count(*) FROM vertex_displacements"), [0.0]);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_link_to_nowhere_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("map.gpkg");
+    std::os::unix::fs::symlink("nowhere.gpkg", &map).unwrap();
+    assert_eq!(run(&fixture("vectors/marked.gpkg"), &map).status.code(), Some(2));
+    assert!(map.is_symlink());
 }

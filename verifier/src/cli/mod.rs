@@ -18,13 +18,13 @@ use meshmark_verifier::{
     inputs::Inputs,
     progress::Progress,
     reading,
-    report::Report,
+    report::{Report, printable},
     report_file::{Format, ReportFile},
     verify,
 };
 use request::request;
 use std::{
-    io::Write,
+    io::{ErrorKind, Write},
     path::{Path, PathBuf},
 };
 
@@ -39,9 +39,25 @@ pub fn run() -> ExitCode {
         Subcommands::Distribute(args) => run_distribute(*args),
     };
     result.unwrap_or_else(|error| {
-        eprintln!("meshmark: {error}");
+        warn(&error.to_string());
         error.exit_code()
     })
+}
+
+/// On one line: names that files are made of shall not steer the terminal.
+fn warn(text: &str) {
+    eprintln!("meshmark: {}", printable(text));
+}
+
+/// Prints an answer. Nobody has to read it to its end.
+fn print(text: &str) -> Result<()> {
+    let mut output = std::io::stdout().lock();
+    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::Usage(format!("the answer cannot be printed: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn keygen(path: &PathBuf) -> Result<ExitCode> {
@@ -66,7 +82,7 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
         let _ = std::fs::remove_file(path); // half a key is worse than none
         return Err(failed(error));
     }
-    println!("key {} written to {}", key.id(), path.display());
+    print(&format!("key {} written to {}\n", key.id(), path.display()))?;
     Ok(ExitCode::Match)
 }
 
@@ -84,7 +100,7 @@ fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
         file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
     let mut comparison = compare(&args.reference, &args.marked, layers, args.precision, file.is_some())?;
     let detail = comparison.detail.take(); // a report file has it
-    print!("{}", if args.json { comparison.to_json() } else { comparison.to_text() });
+    print(&if args.json { comparison.to_json() } else { comparison.to_text() })?;
     if let Some((file, mut detail)) = file.zip(detail) {
         detail.provenance = provenance;
         let comparison = Comparison { detail: Some(detail), ..comparison };
@@ -106,14 +122,13 @@ fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
         folder: args.output_dir,
         format: args.format,
     };
-    let mut warn = |text: &str| eprintln!("meshmark: {text}");
     let done = distribute::distribute(&request, &mut Progress::default(), &mut warn)?;
     let copies = |count| if count == 1 { "1 copy".into() } else { format!("{count} copies") };
     let before = match done.finished_before {
         0 => String::new(),
         count => format!(", {} there already", copies(count)),
     };
-    println!("{} written to {}{before}", copies(done.written), request.folder.display());
+    print(&format!("{} written to {}{before}\n", copies(done.written), request.folder.display()))?;
     Ok(ExitCode::Match)
 }
 
@@ -126,7 +141,6 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let (records, record) = (args.records.clone(), args.record.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
-    let mut warn = |text: &str| eprintln!("meshmark: {text}");
     let mut report = match &records {
         Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
         None => verify(&request, &mut progress)?,
@@ -135,12 +149,12 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
         map.write(&target)?;
     }
     let evidence = report.evidence.take(); // a report file has it
-    print!("{}", if json { report.to_json() } else { report.to_text() });
+    print(&if json { report.to_json() } else { report.to_text() })?;
     let Some(inputs) = inputs else { return Ok(report.exit_code()) };
     let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
     let inputs = inputs.with_record(record.or_else(best).as_deref())?;
     if explain {
-        print!("\n{}", inputs.explain(&report));
+        print(&format!("\n{}", inputs.explain(&report)))?;
     }
     if let Some(file) = file {
         let provenance = Provenance::new(&report, inputs, command_line());

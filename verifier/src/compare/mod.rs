@@ -150,6 +150,10 @@ pub fn compare(
              from it, before anything is removed"
         )));
     }
+    // The reference was surveyed, the other map was not: it may be as far away as numbers go.
+    let all = before.iter().chain(&after).flat_map(|feature| feature.chains.iter().flatten().copied());
+    VertexTable::new(all.collect())
+        .map_err(|error| Error::Unreadable(format!("the marked map {}: {error}", marked.display())))?;
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
     Ok(Pairs { features, ground, grid: precision.unwrap_or(0.0) }.compare(detailed))
 }

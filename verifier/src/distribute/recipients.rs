@@ -33,6 +33,12 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
         if recipient.is_empty() {
             return Err(bad(format!("has no recipient in line {line}: fill it in, or remove the line")));
         }
+        if recipient.contains(char::is_control) {
+            return Err(bad(format!(
+                "has a line break or another control character in the recipient of line {line}: close its quotes, and \
+                 save the list as UTF-8"
+            )));
+        }
         match seen.insert(recipient.to_string()) {
             true => recipients.push(recipient.to_string()),
             false => {
@@ -138,6 +144,8 @@ mod tests {
             (b"name,id\nA,1\n", "2 columns in line 1"),
             (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
             (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
+            (b"A\n\"B\nC\n", "control character in the recipient of line 2"),
+            (b"A\0C\0", "control character in the recipient of line 1"),
         ] {
             let (_, found) = parse(text);
             assert!(found.contains(error), "{}: {found}", String::from_utf8_lossy(text));
