@@ -219,11 +219,7 @@ fn examine_group(
 }
 
 /// What does not fit the reference is wrong in the records.
-fn or_skip<T>(
-    result: Result<T>,
-    group: &Group,
-    skip: &mut dyn FnMut(&str, String),
-) -> Result<Option<T>> {
+fn or_skip<T>(result: Result<T>, group: &Group, skip: &mut dyn FnMut(&str, String)) -> Result<Option<T>> {
     match result {
         Ok(done) => Ok(Some(done)),
         Err(Error::Usage(reason)) => {

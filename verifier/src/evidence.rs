@@ -74,7 +74,9 @@ pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
     let mut files = Vec::new(); // after "--" nothing is an option
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--" => files = std::iter::once("--".into()).chain(arguments.by_ref()).map(|w| quoted(&w)).collect(),
+            "--" => {
+                files = std::iter::once("--".into()).chain(arguments.by_ref()).map(|w| quoted(&w)).collect()
+            }
             "--report" | "--evidence-map" => drop(arguments.next()),
             "--json" | "--explain" => {}
             word if word.starts_with("--report=") || word.starts_with("--evidence-map=") => {}
