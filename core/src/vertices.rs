@@ -11,6 +11,9 @@ pub struct VertexTable {
     coords: Vec<[f64; 2]>,
 }
 
+/// A map is not wider, CRS units.
+pub const WIDEST: f64 = 1e30;
+
 impl VertexTable {
     /// Sorts and merges `coords` (any order, duplicates allowed; CRS units). −0.0 counts as 0.0.
     ///
@@ -43,7 +46,7 @@ impl VertexTable {
         let table = VertexTable { coords };
         let (min, max) = table.bounds();
         let span = (max[0] - min[0]).max(max[1] - min[1]);
-        if span > 1e30 {
+        if span > WIDEST {
             return Err(Error::TooWide { span });
         }
         Ok((table, indices))

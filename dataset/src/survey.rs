@@ -60,6 +60,20 @@ pub struct Selection<'a> {
     pub last_failure: &'a dyn Fn() -> Option<String>,
 }
 
+/// The whole map, without attributes, in its own CRS.
+impl Default for Selection<'_> {
+    fn default() -> Self {
+        Selection {
+            layers: None,
+            srs: None,
+            labels: LabelFields::None,
+            target: Target::Own,
+            most_vertices: crate::MOST_VERTICES,
+            last_failure: &|| None,
+        }
+    }
+}
+
 /// A map as the mark sees it.
 #[derive(Debug)]
 pub struct Survey {

@@ -84,6 +84,14 @@ impl Drop for Workplace {
     }
 }
 
+/// The folder a file is in, or would be.
+pub fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
 /// What went wrong with a file.
 pub fn file_error(action: &'static str, path: &Path, error: io::Error) -> Error {
     Error::File { action, path: path.display().to_string(), reason: error.to_string() }

@@ -14,7 +14,7 @@ use meshmark_core::{
     patches::{Patch, Patches},
     spectrum::Basis,
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
+use meshmark_dataset::{Selection, Survey, survey};
 use meshmark_host_tests::cgal;
 use meshmark_verifier::matching::Matcher;
 use std::{
@@ -97,15 +97,7 @@ fn matching(criterion: &mut Criterion) {
 }
 
 fn survey_of(map: &str) -> Survey {
-    let selection = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Own,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
-    survey(&Dataset::open(map).expect("the fixture opens"), &selection).expect("and is a map")
+    survey(&Dataset::open(map).expect("the fixture opens"), &Selection::default()).expect("and is a map")
 }
 
 /// The vertices of a map, metres from its middle.

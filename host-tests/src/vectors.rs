@@ -15,7 +15,7 @@ use meshmark_core::{
     spectrum::Basis,
     vertices::VertexTable,
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey, wkb};
+use meshmark_dataset::{Selection, Survey, survey, wkb};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -50,15 +50,7 @@ pub fn key() -> SecretKey {
 /// When it cannot be read: the kit is then of no use.
 fn read(path: &Path) -> Survey {
     let dataset = Dataset::open(path).expect("a map GDAL opens");
-    let selection = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Own,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
-    survey(&dataset, &selection).expect("a map of one CRS")
+    survey(&dataset, &Selection::default()).expect("a map of one CRS")
 }
 
 /// Every coordinate of a map, feature by feature.

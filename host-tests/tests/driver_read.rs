@@ -5,7 +5,7 @@ use meshmark_core::{
     carrier::Carrier, code::Code, demodulation, ground::Ground, patches::Patches, record::Record,
     vertices::VertexTable,
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
+use meshmark_dataset::{Selection, Survey, survey};
 use meshmark_host_tests::{
     contents::{self, LayerContents, lengths, moves},
     plugin::{Host, Run, fixture},
@@ -19,15 +19,7 @@ fn source(name: &str) -> String {
 }
 
 fn survey_of(path: &Path) -> Survey {
-    let selection = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Own,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
-    survey(&Dataset::open(path).unwrap(), &selection).unwrap()
+    survey(&Dataset::open(path).unwrap(), &Selection::default()).unwrap()
 }
 
 /// `ogrinfo` of a map through MESHMARK.

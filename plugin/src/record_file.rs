@@ -1,6 +1,7 @@
 //! The record as a file: written whole or not at all, and never over another.
 
 use crate::error::{Error, Result};
+use meshmark_dataset::workplace::folder_of;
 use std::{
     fs::{self, Permissions},
     io::{self, ErrorKind, Write},
@@ -10,7 +11,7 @@ use std::{
 
 /// Whether a record could be written there, so that nobody waits for a mark first.
 pub fn check_folder(path: &Path) -> Result<()> {
-    let reason = match folder(path) {
+    let reason = match folder_of(path) {
         folder if !folder.is_dir() => format!("{} is no folder", folder.display()),
         _ if path.is_dir() => "it is a folder".into(),
         _ => return Ok(()),
@@ -29,7 +30,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
     let mut file = tempfile::Builder::new()
         .prefix(".meshmark-record-")
         .permissions(Permissions::from_mode(0o666)) // less the process's umask, as for any file
-        .tempfile_in(folder(path))
+        .tempfile_in(folder_of(path))
         .map_err(unwritable)?;
     file.write_all(text.as_bytes()).map_err(unwritable)?;
     file.as_file().sync_all().map_err(unwritable)?;
@@ -52,13 +53,6 @@ fn is_same(path: &Path, text: &str) -> Result<bool> {
     }
 }
 
-fn folder(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,7 +70,7 @@ mod tests {
 
     #[test]
     fn a_record_without_a_folder_goes_into_the_current_one() {
-        assert_eq!(folder(Path::new("record.json")), Path::new("."));
+        assert_eq!(folder_of(Path::new("record.json")), Path::new("."));
         assert!(check_folder(Path::new("record.json")).is_ok());
         assert!(check_folder(Path::new("no/such/folder/record.json")).is_err());
         assert!(check_folder(Path::new("/")).is_err());

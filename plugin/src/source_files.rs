@@ -6,7 +6,7 @@
 //! all the same: for them it is copied first ([`save_copies`]).
 
 use crate::error::{Error, Result};
-use meshmark_dataset::{FileId, same_file};
+use meshmark_dataset::{FileId, same_file, workplace::folder_of};
 use std::{
     fs::{self, File, Metadata},
     io,
@@ -131,8 +131,7 @@ impl State {
 
 /// Whether both paths lead to one file, which need not exist yet.
 pub fn same_place(a: &Path, b: &Path) -> bool {
-    let folder =
-        |path: &Path| fs::canonicalize(path.parent().filter(|p| *p != "").unwrap_or(Path::new("."))).ok();
+    let folder = |path: &Path| fs::canonicalize(folder_of(path)).ok();
     same_file(a, b) || a.file_name() == b.file_name() && folder(a).is_some_and(|f| folder(b) == Some(f))
 }
 

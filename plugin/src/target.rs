@@ -8,7 +8,7 @@ use meshmark_core::options::Creation;
 use meshmark_dataset::{
     formats::Format,
     same_file,
-    workplace::{Workplace, file_error},
+    workplace::{Workplace, file_error, folder_of},
 };
 use std::{
     ffi::{OsStr, OsString},
@@ -159,11 +159,7 @@ fn place(path: &Path) -> Result<PathBuf> {
         };
     }
     let Some(name) = path.file_name() else { return refused("no file name") };
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    match folder.canonicalize() {
+    match folder_of(path).canonicalize() {
         Ok(folder) if folder.is_dir() => Ok(folder.join(name)),
         _ => refused("in no folder that exists"),
     }

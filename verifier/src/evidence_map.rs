@@ -6,7 +6,7 @@ use gdal::{
     vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
 };
 use meshmark_core::{carrier::Carrier, demodulation::Demodulation, patches::Patch};
-use meshmark_dataset::CoordinateSystem;
+use meshmark_dataset::{CoordinateSystem, workplace::folder_of};
 use std::{
     io::ErrorKind,
     path::{Path, PathBuf},
@@ -195,7 +195,7 @@ impl Target {
     /// # Errors
     /// The file exists, or its folder cannot be written to.
     pub fn new(path: &Path) -> Result<Self> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         if !folder.is_dir() {
             return Err(unwritable(path, "its folder does not exist"));
         }

@@ -1,6 +1,7 @@
 //! The files of a verification and what identifies them.
 
 use crate::{Error, Result, report::printable};
+use meshmark_dataset::workplace::folder_of;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::{
@@ -87,11 +88,7 @@ fn files_of(path: &Path) -> io::Result<Vec<PathBuf>> {
     } else if !path.is_dir() {
         return Ok(Vec::new());
     }
-    let folder = match path.parent() {
-        _ if path.is_dir() => path,
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let folder = if path.is_dir() { path } else { folder_of(path) };
     let mut files = Vec::new();
     for entry in folder.read_dir()? {
         let file = entry?.path();

@@ -1,6 +1,7 @@
 //! A report as a file: HTML to read or JSON to process, written whole or not at all, and never over another.
 
 use crate::{Error, Result};
+use meshmark_dataset::workplace::folder_of;
 use std::{
     io::{ErrorKind, Write},
     path::{Path, PathBuf},
@@ -37,8 +38,8 @@ impl ReportFile {
         if path.symlink_metadata().is_ok() {
             return refused("exists, and a report is never overwritten: name another file");
         }
-        if !folder(path).is_dir() {
-            let folder = folder(path).display();
+        if !folder_of(path).is_dir() {
+            let folder = folder_of(path).display();
             return refused(&format!("cannot be written: {folder} is no folder, make it first"));
         }
         Ok(ReportFile { path: path.into(), format })
@@ -74,7 +75,7 @@ impl ReportFile {
         #[cfg(unix)] // less the process's umask, as for any file
         options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut file =
-            options.tempfile_in(folder(&self.path)).map_err(|error| failed(without_path(error)))?;
+            options.tempfile_in(folder_of(&self.path)).map_err(|error| failed(without_path(error)))?;
         file.write_all(text.as_bytes()).map_err(|error| failed(without_path(error)))?;
         file.as_file().sync_all().map_err(failed)?;
         file.persist_noclobber(&self.path).map_err(|error| failed(error.error))?;
@@ -85,13 +86,6 @@ impl ReportFile {
 /// The name of the temporary file helps nobody.
 fn without_path(error: std::io::Error) -> std::io::Error {
     error.kind().into()
-}
-
-fn folder(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use gdal::{
     spatial_ref::SpatialRef,
     vector::{Geometry, LayerAccess, LayerOptions, OGRwkbGeometryType::wkbPoint, sql::Dialect},
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Target, survey};
+use meshmark_dataset::{Selection, survey};
 use std::{
     fs,
     net::TcpListener,
@@ -49,15 +49,7 @@ fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
 
 /// The vertices of the marked map.
 fn marked() -> Vec<[f64; 2]> {
-    let selection = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Own,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
-    let map = survey(&Dataset::open(fixture("vectors/marked.gpkg")).unwrap(), &selection).unwrap();
+    let map = survey(&Dataset::open(fixture("vectors/marked.gpkg")).unwrap(), &Selection::default()).unwrap();
     map.vertices.coords().to_vec()
 }
 

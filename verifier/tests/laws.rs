@@ -13,7 +13,7 @@ use meshmark_core::{
     patches::Patches,
     vertices::VertexTable,
 };
-use meshmark_dataset::{Dimension, Label, LabelFields, MOST_VERTICES, Selection, Target, survey};
+use meshmark_dataset::{Dimension, Label, Selection, survey};
 use meshmark_verifier::{
     affine::Affine,
     decision::{Decision, Verdict, decide, decide_among},
@@ -36,15 +36,7 @@ impl Case {
     /// fixtures/kotka.gpkg, marked for ACME GmbH.
     fn kotka() -> Self {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/kotka.gpkg");
-        let selection = Selection {
-            layers: None,
-            srs: None,
-            labels: LabelFields::None,
-            target: Target::Own,
-            most_vertices: MOST_VERTICES,
-            last_failure: &|| None,
-        };
-        let map = survey(&gdal::Dataset::open(path).unwrap(), &selection).unwrap();
+        let map = survey(&gdal::Dataset::open(path).unwrap(), &Selection::default()).unwrap();
         let (on_ground, key) = (map.map().unwrap(), SecretKey::from_bytes([7; 32]));
         let message = key.recipient_message("ACME GmbH");
         let marked = embed(&on_ground, &key, &message, &Parameters::default()).unwrap();

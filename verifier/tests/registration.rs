@@ -1,7 +1,7 @@
 //! The way back is found, from what is left: polygons, lines, points, parts, thinned or bent maps.
 
 use meshmark_core::{ground::Ground, vertices::VertexTable};
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Shape, Target, survey};
+use meshmark_dataset::{Selection, Shape, survey};
 use meshmark_verifier::{
     affine::Affine,
     registration::{Registrar, Registration, Side, Start},
@@ -40,15 +40,7 @@ impl Map {
 
     fn fixture(name: &str) -> Self {
         let path = format!("{}/../fixtures/{name}.gpkg", env!("CARGO_MANIFEST_DIR"));
-        let selection = Selection {
-            layers: None,
-            srs: None,
-            labels: LabelFields::Named(&[]),
-            target: Target::Own,
-            most_vertices: MOST_VERTICES,
-            last_failure: &|| None,
-        };
-        Map::of(survey(&gdal::Dataset::open(path).unwrap(), &selection).unwrap().shapes)
+        Map::of(survey(&gdal::Dataset::open(path).unwrap(), &Selection::default()).unwrap().shapes)
     }
 
     /// Lines that wander about a square kilometre.

@@ -10,7 +10,7 @@ use meshmark_core::{
     patches::{Patch, Patches},
     spectrum::Basis,
 };
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Survey, Target, survey};
+use meshmark_dataset::{Selection, Survey, survey};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::{hint::black_box, path::Path, time::Instant};
@@ -87,13 +87,5 @@ fn best_of_two<T>(mut f: impl FnMut() -> Result<T>) -> Result<(f64, T)> {
 
 /// Reads a map as the driver does.
 fn read(path: &Path) -> Result<Survey> {
-    let selection = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Own,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
-    Ok(survey(&Dataset::open(path)?, &selection)?)
+    Ok(survey(&Dataset::open(path)?, &Selection::default())?)
 }

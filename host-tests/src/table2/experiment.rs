@@ -7,7 +7,7 @@ use super::{
 };
 use crate::attacks::{Map, collusion, noise, similarity};
 use meshmark_core::ground::Ground;
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Target, survey};
+use meshmark_dataset::{Selection, survey};
 use serde::Serialize;
 use std::{
     path::{Path, PathBuf},
@@ -311,15 +311,7 @@ fn outcome(
 /// The attacks' lengths are metres, so a map must be in metres, too.
 fn check_metres(path: &Path) -> Result<()> {
     let dataset = gdal::Dataset::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let everything = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Own,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
-    let ground = survey(&dataset, &everything).and_then(|survey| survey.ground());
+    let ground = survey(&dataset, &Selection::default()).and_then(|survey| survey.ground());
     match ground.map_err(|e| format!("{}: {e}", path.display()))? {
         Ground::Plane { metres_per_unit } if (metres_per_unit - 1.0).abs() < 0.01 => Ok(()),
         _ => Err(format!("{} is not in metres: reproject it first", path.display()).into()),

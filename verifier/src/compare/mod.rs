@@ -13,7 +13,7 @@ use detail::{Detail, Findings};
 use meshmark_core::{
     distortion::{AngleChange, Displacement},
     ground::Ground,
-    vertices::VertexTable,
+    vertices::{VertexTable, WIDEST},
 };
 use meshmark_dataset::FeatureGeometry;
 use serde::Serialize;
@@ -151,9 +151,13 @@ pub fn compare(
         )));
     }
     // The reference was surveyed, the other map was not: it may be as far away as numbers go.
-    let all = before.iter().chain(&after).flat_map(|feature| feature.chains.iter().flatten().copied());
-    VertexTable::new(all.collect())
-        .map_err(|error| Error::Unreadable(format!("the marked map {}: {error}", marked.display())))?;
+    let mut values = after.iter().flat_map(|feature| feature.chains.iter().flatten().flatten());
+    if let Some(value) = values.find(|value| value.abs() > WIDEST) {
+        let marked = marked.display();
+        return Err(Error::Unreadable(format!(
+            "the marked map {marked} has a coordinate of {value:e}: no map is so wide"
+        )));
+    }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
     Ok(Pairs { features, ground, grid: precision.unwrap_or(0.0) }.compare(detailed))
 }
