@@ -1,7 +1,7 @@
 //! The way back is found, from what is left: polygons, lines, points, parts, thinned or bent maps.
 
 use meshmark_core::{ground::Ground, vertices::VertexTable};
-use meshmark_dataset::{Selection, Shape, survey};
+use meshmark_dataset::{LabelFields, Selection, Shape, survey};
 use meshmark_verifier::{
     affine::Affine,
     registration::{Registrar, Registration, Side, Start},
@@ -40,7 +40,14 @@ impl Map {
 
     fn fixture(name: &str) -> Self {
         let path = format!("{}/../fixtures/{name}.gpkg", env!("CARGO_MANIFEST_DIR"));
-        Map::of(survey(&gdal::Dataset::open(path).unwrap(), &Selection::default()).unwrap().shapes)
+        Map::of(
+            survey(
+                &gdal::Dataset::open(path).unwrap(),
+                &Selection { labels: LabelFields::Named(&[]), ..Selection::default() },
+            )
+            .unwrap()
+            .shapes,
+        )
     }
 
     /// Lines that wander about a square kilometre.
