@@ -37,12 +37,71 @@ pub fn map_coordinates<E: From<WkbError>>(
     wkb: &mut [u8],
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
 ) -> Result<(), E> {
-    Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
+    Cursor { bytes: wkb, at: 0, is_plain: true }.geometry(f, 0)
+}
+
+/// Whether a geometry is made of points, lines and polygons: nothing of arcs, triangles or surfaces.
+///
+/// # Errors
+/// [`WkbError`] for bytes that are not a geometry.
+pub fn is_plain(wkb: &mut [u8]) -> Result<bool, WkbError> {
+    let mut cursor = Cursor { bytes: wkb, at: 0, is_plain: true };
+    cursor.geometry::<WkbError>(&mut |_, point| Ok(point), 0)?;
+    Ok(cursor.is_plain)
+}
+
+/// The bytes of a geometry of these chains, each with what it begins as: polygons with their holes, lines, and points
+/// for what has one vertex; a multi-geometry or a collection when there are several.
+pub fn of_chains(chains: &[Vec<[f64; 2]>], kinds: &[Step]) -> Vec<u8> {
+    let mut parts: Vec<(u32, Vec<u8>)> = Vec::new();
+    let mut rest = chains.iter().zip(kinds).peekable();
+    while let Some((chain, kind)) = rest.next() {
+        match kind {
+            Step::Shell => {
+                let mut rings = vec![chain];
+                while let Some((hole, _)) = rest.next_if(|(_, kind)| **kind == Step::Hole) {
+                    rings.push(hole);
+                }
+                let mut polygon = count_bytes(rings.len());
+                rings.iter().for_each(|ring| polygon.extend(sequence_bytes(ring)));
+                parts.push((3, polygon));
+            }
+            _ if chain.len() == 1 => parts.push((1, sequence_bytes(chain).split_off(4))),
+            _ => parts.push((2, sequence_bytes(chain))),
+        }
+    }
+    let mut bytes = Vec::new();
+    if parts.len() != 1 {
+        let first = parts.first().map_or(7, |part| part.0);
+        let is_multi = !parts.is_empty() && parts.iter().all(|part| part.0 == first);
+        bytes.extend(head(if is_multi { first + 3 } else { 7 }));
+        bytes.extend(count_bytes(parts.len()));
+    }
+    for (kind, part) in parts {
+        bytes.extend(head(kind));
+        bytes.extend(part);
+    }
+    bytes
+}
+
+fn head(kind: u32) -> Vec<u8> {
+    [&[1][..], &kind.to_le_bytes()].concat()
+}
+
+fn count_bytes(count: usize) -> Vec<u8> {
+    (count as u32).to_le_bytes().into()
+}
+
+fn sequence_bytes(chain: &[[f64; 2]]) -> Vec<u8> {
+    let mut bytes = count_bytes(chain.len());
+    chain.iter().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
+    bytes
 }
 
 struct Cursor<'a> {
     bytes: &'a mut [u8],
     at: usize,
+    is_plain: bool,
 }
 
 /// Byte order and number of ordinates, from the head of a geometry.
@@ -67,6 +126,7 @@ impl Cursor<'_> {
             self.take::<4>()?; // the SRID of extended WKB
         }
         let layout = Layout { little_endian, ordinates };
+        self.is_plain &= kind <= 7;
         match kind {
             1 => self.point(&layout, f, Step::First, true),
             2 | 8 => self.sequence(&layout, f, Step::First), // LineString, CircularString

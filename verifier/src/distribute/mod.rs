@@ -22,7 +22,11 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError, Survey, formats::Format, marking, parse_srs, threads, workplace::Workplace,
+    Error as MapError, Survey,
+    formats::Format,
+    marking::{self, Unmarked},
+    parse_srs, threads,
+    workplace::Workplace,
 };
 use std::{
     fs,
@@ -63,6 +67,7 @@ struct Job<'a> {
     key: &'a SecretKey,
     options: &'a Options,
     vertices: &'a VertexTable,
+    unmarked: Unmarked<'a>,
     reference: Reference,
     format: &'static Format,
     /// The GeoPackage with the unmarked map.
@@ -178,7 +183,10 @@ fn run(
     let warnings = marking::warnings(parameters, &message, survey, embedding.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
     let reference = marking::reference(survey, embedding.patches());
-    let job = Job { key, options, vertices: &survey.vertices, reference, format, staged, folder };
+    let geometries = survey.geometries.as_ref().expect("the map was read with them");
+    let unmarked = pool.install(|| Unmarked::new(geometries, &map));
+    let vertices = &survey.vertices;
+    let job = Job { key, options, vertices, unmarked, reference, format, staged, folder };
     let mut written = 0;
     for batch in copies.chunks(embedding.batch()) {
         progress.start("solving patches", embedding.patches() as u64);
@@ -192,7 +200,10 @@ fn run(
             next.map(|((copy, message), wanted)| {
                 let marked = pool.install(|| embedding.settle(&message, &wanted)).map_err(Error::from);
                 drop(wanted);
-                let written = marked.and_then(|marked| writing::write(&job, copy, &marked));
+                let written = marked.and_then(|marked| {
+                    let distortion = pool.install(|| job.unmarked.distortion(&marked, parameters));
+                    writing::write(&job, copy, &marked.coords, distortion)
+                });
                 written.map(|()| step(1)).map_err(|error| error.of(&copy.recipient))
             })
         };

@@ -9,7 +9,7 @@ use gdal::{
     Dataset, DatasetOptions, GdalOpenFlags,
     vector::{Geometry, LayerAccess, sql::Dialect},
 };
-use meshmark_core::embedding::Marked;
+use meshmark_core::record::Distortion;
 use meshmark_dataset::{
     Error as MapError,
     formats::Format,
@@ -24,11 +24,11 @@ use std::{ffi::OsStr, fs, path::Path};
 const UNSEEN: [(&str, &str); 2] = [("OGR_SQLITE_SYNCHRONOUS", "OFF"), ("OGR_SQLITE_JOURNAL", "OFF")];
 
 /// Writes, checks and publishes a copy and its record.
-pub fn write(job: &Job, copy: &Copy, marked: &Marked) -> Result<()> {
+pub fn write(job: &Job, copy: &Copy, moved: &[[f64; 2]], distortion: Distortion) -> Result<()> {
     for (option, value) in UNSEEN {
         gdal::config::set_thread_local_config_option(option, value).map_err(MapError::from)?;
     }
-    let moves = Moves { from: job.vertices, to: &marked.coords };
+    let moves = Moves { from: job.vertices, to: moved };
     let workplace = Workplace::new(job.folder)?;
     let folder = workplace.subfolder("out")?;
     let file = folder.join(copy.file.file_name().expect("a copy has a name"));
@@ -40,9 +40,9 @@ pub fn write(job: &Job, copy: &Copy, marked: &Marked) -> Result<()> {
         ogr2ogr::copy(job.format.driver, &staged, &file, &[])?;
     }
     check(job, &file, moves)?;
-    let record =
-        marking::record(job.options, &copy.subject(), job.key, job.reference.clone(), marked).to_json();
-    publish(copy, &workplace, &folder, &record, job.format)
+    let reference = job.reference.clone();
+    let record = marking::record(job.options, &copy.subject(), job.key, reference, distortion);
+    publish(copy, &workplace, &folder, &record.to_json(), job.format)
 }
 
 /// The staged map with moved geometries, as a GeoPackage.
