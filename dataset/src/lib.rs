@@ -9,6 +9,7 @@ mod error;
 mod features;
 mod file_id;
 pub mod formats;
+pub mod geopackage;
 mod labels;
 pub mod marking;
 pub mod publication;

@@ -11,6 +11,8 @@ pub enum WkbError {
     UnknownType(u32),
     #[error("the geometry is nested more than {MOST_NESTED} deep")]
     TooDeep,
+    #[error("the geometry does not begin as those of a GeoPackage do")]
+    NoHeader,
 }
 
 const MOST_NESTED: usize = 64;
@@ -38,6 +40,13 @@ pub fn map_coordinates<E: From<WkbError>>(
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
 ) -> Result<(), E> {
     Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
+}
+
+/// Whether a legal geometry may have arcs in it, which leave the bounding box of their coordinates.
+pub(crate) fn may_bend(wkb: &[u8]) -> bool {
+    let code = wkb.get(1..5).and_then(|code| code.try_into().ok()).unwrap_or_default();
+    let code = if wkb[0] == 1 { u32::from_le_bytes(code) } else { u32::from_be_bytes(code) };
+    matches!(decode_type(code).0, 7..=14) // collections; arcs, and what is made of them
 }
 
 struct Cursor<'a> {
