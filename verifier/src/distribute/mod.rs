@@ -175,7 +175,7 @@ fn run(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
     progress.start("patches", 0);
-    let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters))?;
+    let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
     let message = copies[0].message(key);
     let warnings = marking::warnings(parameters, &message, survey, embedding.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
