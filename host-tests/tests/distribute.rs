@@ -163,6 +163,18 @@ fn one_layer_goes_into_every_format_as_by_the_driver() {
 }
 
 #[test]
+fn what_ogr2ogr_warns_of_is_said_once() {
+    let host = host();
+    let sql = "ALTER TABLE buildings ADD COLUMN longer_than_ten TEXT";
+    host.run("ogrinfo", &["-q", "map.gpkg", "-sql", sql]).succeeds();
+    host.run("ogr2ogr", &["-f", "GPKG", "one.gpkg", "map.gpkg", "buildings"]).succeeds();
+    let said = distribute(&host, "out", "one.gpkg", &["-f", "ESRI Shapefile"], "2").succeeds().stderr;
+    let cut = "meshmark: ogr2ogr: Normalized/laundered field name: 'longer_than_ten' to 'longer_tha'";
+    assert_eq!(said.lines().filter(|line| *line == cut).count(), 1, "{said}");
+    assert!(!said.contains(".meshmark-write-"), "{said}");
+}
+
+#[test]
 fn one_thread_and_two_make_the_same_copies() {
     let host = host();
     for threads in ["1", "2"] {
