@@ -62,7 +62,7 @@ pub struct Geometries {
     kinds: Vec<Step>,
     /// Which of the chains is the first of each geometry, ascending.
     firsts: Vec<u32>,
-    /// Those of arcs, triangles and surfaces, as well-known binary: chains do not tell all of them.
+    /// Those that are not of points, lines or polygons, as well-known binary: chains do not tell all of them.
     others: BTreeMap<u32, Vec<u8>>,
 }
 

@@ -10,6 +10,7 @@ mod features;
 mod file_id;
 pub mod formats;
 mod geometries;
+pub mod geopackage;
 mod labels;
 pub mod marking;
 pub mod publication;

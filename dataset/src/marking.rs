@@ -48,17 +48,14 @@ impl Moves<'_> {
 }
 
 /// Why a geometry was not moved.
+#[derive(Debug, thiserror::Error)]
 pub enum NotMoved {
     /// Its coordinate is not in the table.
+    #[error("({}, {}) was not there when the map was read", .0[0], .0[1])]
     UnknownVertex([f64; 2]),
     /// Its bytes make no sense.
-    Wkb(wkb::WkbError),
-}
-
-impl From<wkb::WkbError> for NotMoved {
-    fn from(error: wkb::WkbError) -> Self {
-        NotMoved::Wkb(error)
-    }
+    #[error(transparent)]
+    Wkb(#[from] wkb::WkbError),
 }
 
 /// Smaller than so many tolerances a map would be noise after its marking.

@@ -213,7 +213,7 @@ pub(crate) struct Chains {
     pub(crate) kinds: Vec<Step>,
     /// Which of them is the first of each geometry, ascending.
     pub(crate) firsts: Vec<u32>,
-    /// The geometries that are not plain, by their numbers.
+    /// The geometries that are more than their chains, by their numbers.
     pub(crate) others: BTreeMap<u32, Vec<u8>>,
 }
 
@@ -386,7 +386,7 @@ fn read_geometry(
     let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
     let failed = |reason: String| Error::Geometry { layer: layer.into(), fid: fid(), reason };
     let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
-    if keeps_geometries && !wkb::is_plain(&mut bytes).map_err(|error| failed(error.to_string()))? {
+    if keeps_geometries && !wkb::is_plain(&bytes) {
         chains.others.insert(chains.firsts.len() as u32, bytes.clone());
     }
     chains.begin_geometry();

@@ -11,6 +11,8 @@ pub enum WkbError {
     UnknownType(u32),
     #[error("the geometry is nested more than {MOST_NESTED} deep")]
     TooDeep,
+    #[error("the geometry does not begin as those of a GeoPackage do")]
+    NoHeader,
 }
 
 const MOST_NESTED: usize = 64;
@@ -37,17 +39,7 @@ pub fn map_coordinates<E: From<WkbError>>(
     wkb: &mut [u8],
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
 ) -> Result<(), E> {
-    Cursor { bytes: wkb, at: 0, is_plain: true }.geometry(f, 0)
-}
-
-/// Whether a geometry is made of points, lines and polygons: nothing of arcs, triangles or surfaces.
-///
-/// # Errors
-/// [`WkbError`] for bytes that are not a geometry.
-pub fn is_plain(wkb: &mut [u8]) -> Result<bool, WkbError> {
-    let mut cursor = Cursor { bytes: wkb, at: 0, is_plain: true };
-    cursor.geometry::<WkbError>(&mut |_, point| Ok(point), 0)?;
-    Ok(cursor.is_plain)
+    Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
 }
 
 /// The bytes of a geometry of these chains, each with what it begins as: polygons with their holes, lines, and points
@@ -98,10 +90,17 @@ fn sequence_bytes(chain: &[[f64; 2]]) -> Vec<u8> {
     bytes
 }
 
+/// Whether a legal geometry is of points, lines or polygons. All others may have arcs, which are more than their
+/// coordinates.
+pub(crate) fn is_plain(wkb: &[u8]) -> bool {
+    let code = wkb.get(1..5).and_then(|code| code.try_into().ok()).unwrap_or_default();
+    let code = if wkb.first() == Some(&1) { u32::from_le_bytes(code) } else { u32::from_be_bytes(code) };
+    matches!(decode_type(code).0, 1..=6)
+}
+
 struct Cursor<'a> {
     bytes: &'a mut [u8],
     at: usize,
-    is_plain: bool,
 }
 
 /// Byte order and number of ordinates, from the head of a geometry.
@@ -126,7 +125,6 @@ impl Cursor<'_> {
             self.take::<4>()?; // the SRID of extended WKB
         }
         let layout = Layout { little_endian, ordinates };
-        self.is_plain &= kind <= 7;
         match kind {
             1 => self.point(&layout, f, Step::First, true),
             2 | 8 => self.sequence(&layout, f, Step::First), // LineString, CircularString
