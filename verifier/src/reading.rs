@@ -326,7 +326,8 @@ fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dat
     forget_failure();
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
-        open_options: Some(&[COLUMNS_OF_CSV]),
+        // A map that is read leaves nothing beside it.
+        open_options: Some(&[COLUMNS_OF_CSV, "@WRITE_GFS=NO"]),
         allowed_drivers,
         ..Default::default()
     };

@@ -295,9 +295,10 @@ pub fn power_of_ten(log10: f64) -> String {
     if log10 > -3.0 { format!("{:.3}", 10f64.powf(log10)) } else { format!("10^{log10:.1}") }
 }
 
-/// Text of a file on one line, without what would steer a terminal.
+/// Text of a file on one line, without what would steer a terminal or turn the order of what is read.
 pub fn printable(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+    let turns = |c: char| matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.chars().map(|c| if c.is_control() || turns(c) { '\u{fffd}' } else { c }).collect()
 }
 
 /// How sure the bits are, from their log-likelihood ratios.
@@ -327,5 +328,6 @@ mod tests {
     #[test]
     fn names_do_not_steer_the_terminal() {
         assert_eq!(printable("A\u{1b}[31m\nB é"), "A\u{fffd}[31m\u{fffd}B é");
+        assert_eq!(printable("HbmG \u{202e}EMCA"), "HbmG \u{fffd}EMCA");
     }
 }

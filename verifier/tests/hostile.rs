@@ -84,6 +84,20 @@ fn ten_times_as_many_vertices_do_not_hide_the_mark() {
 }
 
 #[test]
+fn a_suspect_in_gml_is_read_and_nothing_is_left_beside_it() {
+    let folder = TempDir::new().unwrap();
+    let converted = Command::new("ogr2ogr")
+        .args(["-f", "GML", "-dsco", "XSISCHEMA=OFF", "suspect.gml"])
+        .arg(fixture("vectors/marked.gpkg"))
+        .current_dir(&folder)
+        .output();
+    assert!(converted.unwrap().status.success());
+    assert_answer(&folder.path().join("suspect.gml"), 0, "MATCH");
+    let files: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(files, ["suspect.gml"]);
+}
+
+#[test]
 fn nothing_few_points_and_other_points_elsewhere_are_inconclusive() {
     let folder = TempDir::new().unwrap();
     let random = |i: u64| 1000.0 * (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);
