@@ -23,14 +23,11 @@ impl Spread {
     pub fn of(mut values: Vec<f64>) -> Self {
         values.par_sort_unstable_by(f64::total_cmp);
         let count = values.len().max(1) as f64;
+        // The sum of nothing would be -0.
+        let mean = |of: fn(f64) -> f64| values.iter().fold(0.0, |sum, v| sum + of(*v)) / count;
         let at =
             |percent: usize| values.len().checked_sub(1).map_or(0.0, |last| values[last * percent / 100]);
-        Spread {
-            mean: values.iter().sum::<f64>() / count,
-            root_mean_square: (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
-            p99: at(99),
-            max: at(100),
-        }
+        Spread { mean: mean(|v| v), root_mean_square: mean(|v| v * v).sqrt(), p99: at(99), max: at(100) }
     }
 }
 
@@ -195,6 +192,12 @@ mod tests {
         moved[1] = [4.0, 4.0]; // half of a right angle
         let bent = AngleChange::at_corners(&map, &moved);
         assert!((bent.mean_change_deg - 22.5).abs() < 1e-9 && bent.right_angles_kept == 0.5, "{bent:?}");
+    }
+
+    #[test]
+    fn of_nothing_all_is_zero_without_a_sign() {
+        let Spread { mean, root_mean_square, p99, max } = Spread::of(Vec::new());
+        assert_eq!([mean, root_mean_square, p99, max].map(f64::to_bits), [0; 4]);
     }
 
     #[test]

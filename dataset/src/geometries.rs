@@ -46,6 +46,11 @@ impl Outline {
         }
     }
 
+    /// Whether its chains are all of it: no arcs, no collections.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.wkb.as_deref().is_none_or(wkb::is_plain)
+    }
+
     /// Its first vertex.
     pub fn first(&self) -> Option<[f64; 2]> {
         self.chains.first()?.first().copied()

@@ -163,6 +163,18 @@ fn one_layer_goes_into_every_format_as_by_the_driver() {
 }
 
 #[test]
+fn the_extent_a_geojson_file_speaks_of_is_not_copied() {
+    let host = host();
+    let options = ["-f", "GeoJSON", "-lco", "RFC7946=YES", "-lco", "WRITE_BBOX=YES"];
+    host.run("ogr2ogr", &[&options[..], &["map.geojson", "map.gpkg", "buildings"]].concat()).succeeds();
+    distribute(&host, "out", "map.geojson", &["-f", "GPKG"], "2").succeeds();
+    for (_, stem) in RECIPIENTS {
+        let copy = fs::read(host.path(&format!("out/{stem}.gpkg"))).unwrap();
+        assert!(!copy.windows(4).any(|bytes| bytes == b"bbox"), "{stem}");
+    }
+}
+
+#[test]
 fn what_ogr2ogr_warns_of_is_said_once() {
     let host = host();
     let sql = "ALTER TABLE buildings ADD COLUMN longer_than_ten TEXT";

@@ -56,7 +56,13 @@ impl Sight {
         let mut bounds = AABB::new_empty();
         outline.chains.iter().flatten().for_each(|point| bounds.merge(&AABB::from_point(*point)));
         match outline.geometry() {
-            Some(geometry) => Sight { is_valid: geometry.is_valid(), area: geometry.area(), bounds },
+            Some(geometry) => {
+                if !outline.is_plain() && !outline.chains.is_empty() {
+                    let whole = geometry.envelope(); // with the bellies of arcs
+                    bounds.merge(&AABB::from_corners([whole.MinX, whole.MinY], [whole.MaxX, whole.MaxY]));
+                }
+                Sight { is_valid: geometry.is_valid(), area: geometry.area(), bounds }
+            }
             None => Sight { is_valid: false, area: 0.0, bounds },
         }
     }

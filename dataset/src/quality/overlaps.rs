@@ -46,13 +46,13 @@ fn large(outlines: Outlines, boxes: &[Box]) -> BTreeMap<u32, Option<Linework>> {
     boxes.par_iter().filter_map(sorted).collect()
 }
 
-/// The segments of a geometry of closed rings, none for others.
+/// The segments of a geometry of closed rings, none for others, arcs among them.
 fn rings(outline: &Outline) -> Option<Linework> {
     let is_ring = |(chain, kind): (&Vec<[f64; 2]>, &Step)| {
         matches!(kind, Step::Shell | Step::Hole) && chain.first() == chain.last()
     };
     let are_rings = outline.chains.iter().zip(&outline.kinds).all(is_ring);
-    are_rings.then(|| Linework::new(outline, [1.0; 2]))
+    (are_rings && outline.is_plain()).then(|| Linework::new(outline, [1.0; 2]))
 }
 
 struct Search<'a> {
@@ -205,6 +205,17 @@ mod tests {
         assert!(!of(0.997e-6, 1.002e-6));
         assert!(of(0.997e-6, 2.1e-6) && of(0.0, 1.1e-6));
         assert!(!of(0.0, 0.9e-6) && !of(1.0, 2.0));
+    }
+
+    #[test]
+    fn arcs_overlap_by_their_bellies() {
+        let disc = "CURVEPOLYGON (CIRCULARSTRING (0 0, 10 0, 0 0))".to_string();
+        for (other, expected) in
+            [(polygon(4.5, 3.0, 1.0), 1), (polygon(4.5, 5.5, 1.0), 0), (polygon(0.0, 4.0, 1.0), 0)]
+        {
+            let all = [disc.clone(), other.clone()];
+            assert_eq!(quality(&all, &all, 0.0).overlaps.before, expected, "{other}");
+        }
     }
 
     #[test]

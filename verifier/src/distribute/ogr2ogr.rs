@@ -10,7 +10,13 @@ use std::{
 /// Copies a dataset to a new one of this format; what `ogr2ogr` warned of.
 pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Vec<String>> {
     let mut command = Command::new("ogr2ogr");
-    command.args(["-f", format]).args(options).arg(named(to)).arg(named(from)).stdin(Stdio::null());
+    // A GeoJSON file may say in its own words what extent it had.
+    command
+        .args(["-f", format, "-noNativeData"])
+        .args(options)
+        .arg(named(to))
+        .arg(named(from))
+        .stdin(Stdio::null());
     let output = command.output().map_err(|error| {
         Error::Usage(format!("ogr2ogr cannot be run ({error}): install GDAL's programs (package gdal-bin)"))
     })?;
