@@ -7,6 +7,7 @@ use crate::{
     map::Map,
     nearness::VertexTree,
     options::Shape,
+    sides::Touching,
 };
 
 /// The constraints of a map.
@@ -16,6 +17,8 @@ pub struct Constraints {
     pub junctions: Junctions,
     /// Polygons that move as one.
     pub bodies: Bodies,
+    /// All vertices that lie on segments, and those.
+    pub(crate) touching: Vec<Touching>,
 }
 
 impl Constraints {
@@ -28,7 +31,8 @@ impl Constraints {
             }
             _ => Bodies::default(),
         };
+        let touching = touches.iter().map(|touch| (touch.vertex, touch.segment)).collect();
         touches.retain(|touch| bodies.of(touch.vertex).is_none());
-        Constraints { junctions: Junctions::new(touches), bodies }
+        Constraints { junctions: Junctions::new(touches), bodies, touching }
     }
 }

@@ -153,7 +153,10 @@ impl<'a> Embedding<'a> {
         let basis = Basis::known_or_solved(&self.bases, number, patch, self.carriers + 1)?;
         let gain = match self.parameters.shape {
             Shape::Free => 1.0,
-            Shape::Rigid => Response::new(patch, basis.vectors.subcols(1, self.carriers).to_owned()).gain(),
+            Shape::Rigid => {
+                let carriers = basis.vectors.subcols(1, self.carriers);
+                Response::new(patch, carriers.to_owned()).gain(patch, carriers.to_owned())
+            }
         };
         let chips = self.chips(number);
         let in_units = |((&vertex, x), y): ((&u32, f64), f64)| {

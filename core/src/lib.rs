@@ -60,6 +60,7 @@ pub mod patches;
 mod placement;
 pub mod record;
 mod response;
+mod sides;
 pub mod spectrum;
 mod topology;
 mod tridiagonal;

@@ -42,6 +42,11 @@ impl Placement {
         }
     }
 
+    /// Whether a vertex at `from` may end there.
+    pub fn allows(&self, from: [f64; 2], to: [f64; 2]) -> bool {
+        !self.is_pinned(from) && distance_m(from, to, self.ground.metres_per_unit(from)) <= self.tolerance_m
+    }
+
     /// Whether a vertex must stay where it is.
     pub fn is_pinned(&self, from: [f64; 2]) -> bool {
         self.ground.is_pinned(from, self.tolerance_m)

@@ -37,22 +37,21 @@ impl Response {
     /// then the mark is expected to move vertices as far, root mean square, as it moves free ones.
     pub fn carriers(patch: &Patch, basis: &Basis, shape: Shape) -> Self {
         let carriers = basis.vectors.ncols() - 1;
-        let mut response = Self::new(patch, basis.vectors.subcols(1, carriers).to_owned());
+        let basis = basis.vectors.subcols(1, carriers);
+        let mut response = Self::new(patch, basis.to_owned());
         if shape == Shape::Rigid {
-            let gain = response.gain();
+            let gain = response.gain(patch, basis.to_owned());
             response.blocks_mut().iter_mut().for_each(|block| *block *= Scale(gain));
         }
         response
     }
 
-    /// The root of what columns of length 1 move, squared, over what these move.
-    pub fn gain(&self) -> f64 {
-        let energy: f64 = self.blocks().iter().map(|block| block.squared_norm_l2()).sum();
-        let free = match self {
-            Response::Separate(block) => block.ncols(),
-            Response::Coupled(blocks) => 2 * blocks[0][0].ncols(),
-        };
-        if energy > 0.0 { (free as f64 / energy).sqrt() } else { 1.0 }
+    /// The root of what the basis functions move, squared, with T-junctions alone, over what they move with bodies.
+    pub fn gain(&self, patch: &Patch, mut basis: Mat<f64>) -> f64 {
+        let Response::Coupled(blocks) = self else { return 1.0 };
+        patch.follow(&mut basis);
+        let energy: f64 = blocks.as_flattened().iter().map(|block| block.squared_norm_l2()).sum();
+        if energy > 0.0 { (2.0 * basis.squared_norm_l2() / energy).sqrt() } else { 1.0 }
     }
 
     /// The response to basis functions (columns, n × k): free vertices follow them, bodies as well as they can,
@@ -115,13 +114,6 @@ impl Response {
             }
         };
         products.map(|product| product.iter().copied().collect())
-    }
-
-    fn blocks(&self) -> &[Mat<f64>] {
-        match self {
-            Response::Separate(block) => std::slice::from_ref(block),
-            Response::Coupled(blocks) => blocks.as_flattened(),
-        }
     }
 
     /// The rows of some vertices.

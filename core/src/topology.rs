@@ -12,6 +12,7 @@ use crate::{
     motion::{Slack, keeps_apart},
     nearness::VertexTree,
     placement::Placement,
+    sides,
 };
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -64,7 +65,9 @@ pub(crate) fn settle(
     };
     let energy: f64 = free.iter().zip(&movement.coords).map(apart).sum();
     let deviation_m = (energy / (2 * wanted.len()) as f64).sqrt();
-    Settled { coords: movement.coords, attenuated, deviation_m }
+    let mut coords = movement.coords;
+    sides::keep(map, &constraints.touching, placement, &mut coords);
+    Settled { coords, attenuated, deviation_m }
 }
 
 /// A vertex and a segment that come together.

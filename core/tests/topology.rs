@@ -266,3 +266,52 @@ fn on_a_grid_junctions_hold_within_a_step() {
         }
     }
 }
+
+#[test]
+fn a_hole_that_touches_the_wall_stays_inside_to_the_last_bit() {
+    // Squares, each with a triangle inside that touches the wall on its left; some are turned.
+    let mut sketch = Sketch::default();
+    let mut contacts = Vec::new();
+    for i in 0..400 {
+        let at = [f64::from(i % 20) * 13.1, f64::from(i / 20) * 13.3];
+        let angle = if i % 2 == 0 { 0.0 } else { 0.01 * f64::from(i) };
+        let corners = |ring: &[[f64; 2]]| -> Vec<[f64; 2]> {
+            ring.iter().map(|[x, y]| turned([at[0] + x, at[1] + y], at, angle)).collect()
+        };
+        let shell = corners(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]);
+        let hole = corners(&[[0.0, 5.0], [4.0, 3.0], [4.0, 7.0]]);
+        sketch.ring(&shell);
+        sketch.ring(&hole);
+        contacts.push([shell[3], shell[0], hole[0]]); // with the square on the left of the first two
+    }
+    let town = sketch.survey();
+    let side = |contact: [[f64; 2]; 3]| {
+        let [a, b, p] = contact.map(|[x, y]| robust::Coord { x, y });
+        robust::orient2d(a, b, p)
+    };
+    for shape in [Shape::Free, Shape::Rigid] {
+        let marked = town.mark(&Parameters { shape, ..parameters() });
+        for contact in &contacts {
+            let moved = contact.map(|vertex| marked.coords[town.vertices.index_of(vertex).unwrap()]);
+            let (before, after) = (side(*contact), side(moved));
+            let is_kept = if before == 0.0 { after >= 0.0 } else { before * after > 0.0 };
+            assert!(is_kept, "{shape:?}: {before} {after}");
+        }
+        assert!(marked.displacement.max_m <= parameters().tolerance_m);
+    }
+}
+
+#[test]
+fn where_nothing_is_rigid_rigid_shapes_are_free_ones() {
+    // A wall of bricks, each on the joint of two others: one group, too large to move as one.
+    let mut sketch = Sketch::default();
+    for row in 0..20 {
+        for brick in 0..20 {
+            let (x, y) = (4.0 * f64::from(brick) + 2.0 * f64::from(row % 2), 2.0 * f64::from(row));
+            sketch.ring(&[[x, y], [x + 4.0, y], [x + 4.0, y + 2.0], [x, y + 2.0]]);
+        }
+    }
+    let town = sketch.survey();
+    let marked = |shape| town.mark(&Parameters { shape, ..parameters() });
+    assert_eq!(marked(Shape::Rigid).coords, marked(Shape::Free).coords);
+}
