@@ -4,6 +4,7 @@
 #   run.sh         build test_ogrsf if need be, then run it; needs the plugin and the command line
 #                  tool, both built in release mode
 #   run.sh build   only build test_ogrsf
+#   run.sh with P  run P, the test_ogrsf of another GDAL, whose ogr2ogr comes first in PATH
 #
 # Debian packages no test_ogrsf: it is compiled here, once, from the source package of the very
 # libgdal-dev that is installed. All files go to target/conformance; apt's configuration, lists and
@@ -137,5 +138,10 @@ run() {
     check_pair shapefile "$scratch/buildings.shp"
 }
 
-build
+if [[ ${1:-} == with ]]; then
+    test_ogrsf=$2
+    mkdir -p "$work"
+else
+    build
+fi
 [[ ${1:-} == build ]] || run
