@@ -4,7 +4,7 @@
 # Usage: build_gdal.sh FOLDER DATA: DATA is the folder of data of another GDAL 3.12; the crate of gdal_source.sh has not all.
 set -euo pipefail
 
-readonly drivers=(GPKG SQLITE FLATGEOBUF CSV GML KML LIBKML TAB DXF) # and Shapefile, GeoJSON, MEM, VRT, GTiff: always built
+readonly drivers=(GPKG SQLITE FLATGEOBUF CSV GML KML LIBKML TAB DXF VRT) # and Shapefile, GeoJSON, MEM, GTiff: always built
 readonly libraries=(ZLIB JSONC TIFF GEOTIFF GEOS SQLITE3 EXPAT ICONV LIBKML)
 
 root=$(cd "$(dirname "$0")/../.." && pwd)

@@ -37,6 +37,10 @@ with_3_12 "$root/host-tests/conformance/run.sh" with "$gdal/bin/test_ogrsf"
 
 cp "$fixture" map.gpkg
 system=$(gdal-config --version | cut -d . -f 1,2)
+other=$folder/target/release/gdalplugins
 compiled="MESHMARK was compiled against GDAL"
-refused "the driver of $system in 3.12" "$GDAL_DRIVER_PATH" "$compiled $system, but the current library version is 3.12" \
-    with_3_12 env GDAL_DRIVER_PATH="$GDAL_DRIVER_PATH" ogr2ogr
+refused "3.12 with the driver for $system" "$GDAL_DRIVER_PATH" "$compiled $system, but the current library version is 3.12" \
+    "$gdal/bin/ogr2ogr"
+refused "$system with the driver for 3.12" "$other" "$compiled 3.12, but the current library version is $system" \
+    env LD_LIBRARY_PATH="$gdal/lib" ogr2ogr
+refused "$system with the driver for 3.12, which is not installed" "$other" "libgdal.so.*: cannot open shared object file" ogr2ogr
