@@ -32,6 +32,9 @@ const PLAIN: Read = Read { format: "", ending: "", source: &LAYER, options: &[],
 /// These formats do not say which CRS they are in.
 const CRS: [&str; 2] = ["-oo", "SRS=EPSG:3067"];
 
+/// From GDAL 3.11 on the column is named after the source's, and only one named `WKT` is read again.
+const AS_WKT: [&str; 4] = ["-lco", "GEOMETRY=AS_WKT", "-lco", "GEOMETRY_NAME=WKT"];
+
 const READ: &[Read] = &[
     Read { format: "GPKG", ending: ".gpkg", ..PLAIN },
     Read { format: "ESRI Shapefile", ending: "", source: &[], ..PLAIN }, // all layers, in a folder
@@ -49,7 +52,7 @@ const READ: &[Read] = &[
     Read { format: "MapInfo File", ending: ".tab", ..PLAIN },
     Read { format: "MapInfo File", ending: ".mif", open: &CRS, ..PLAIN },
     Read { format: "DXF", ending: ".dxf", source: &BARE, open: &CRS, ..PLAIN },
-    Read { format: "CSV", ending: ".csv", options: &["-lco", "GEOMETRY=AS_WKT"], open: &CRS, ..PLAIN },
+    Read { format: "CSV", ending: ".csv", options: &AS_WKT, open: &CRS, ..PLAIN },
     Read { format: "SQLite", ending: ".sqlite", ..PLAIN },
     Read { format: "SQLite", ending: "-spatialite.sqlite", options: &["-dsco", "SPATIALITE=YES"], ..PLAIN },
 ];
@@ -84,7 +87,8 @@ fn a_zipped_shapefile_is_read_where_it_is() {
 #[test]
 fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
     let host = Host::new();
-    let make = ["-f", "CSV", "map.csv", &kotka(), "buildings", "-lco", "GEOMETRY=AS_WKT"];
+    let from = kotka();
+    let make = [&["-f", "CSV", "map.csv", &from, "buildings"][..], &AS_WKT].concat();
     host.run("ogr2ogr", &make).succeeds();
     host.mark("GPKG", "marked.gpkg", "map.csv", &CRS).succeeds();
     let layer = host.run("ogrinfo", &["-so", "marked.gpkg", "map"]).succeeds().stdout;
