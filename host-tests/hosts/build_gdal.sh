@@ -5,7 +5,7 @@
 set -euo pipefail
 
 readonly drivers=(GPKG SQLITE FLATGEOBUF CSV GML KML LIBKML TAB DXF VRT) # and Shapefile, GeoJSON, MEM, GTiff: always built
-readonly libraries=(ZLIB JSONC TIFF GEOTIFF GEOS SQLITE3 EXPAT ICONV LIBKML)
+readonly libraries=(ZLIB JSONC TIFF GEOTIFF GEOS SQLITE3 SPATIALITE EXPAT ICONV LIBKML)
 
 root=$(cd "$(dirname "$0")/../.." && pwd)
 mkdir -p "$(dirname "$1")"
