@@ -2,7 +2,7 @@
 # Installs the Debian or Ubuntu packages that are missing, those given as arguments too. Asks for nothing when all are there.
 set -euo pipefail
 
-packages=(g++ pkg-config gdal-bin libgdal-dev libcgal-dev libgmp-dev "$@")
+packages=(g++ pkg-config gdal-bin libgdal-dev libsqlite3-dev libcgal-dev libgmp-dev "$@")
 
 missing=()
 for package in "${packages[@]}"; do

@@ -236,9 +236,27 @@ pub fn joint(
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Demodulation> {
     let job = Job::new(patches, carrier, observed, bits, parameters, progress)?;
+    joint_of(&job, disturbance)
+}
+
+/// The same, with the bases of the first patches in `solved`.
+pub(crate) fn joint_solved(
+    (patches, solved): (&Patches, &[Basis]),
+    carrier: &Carrier,
+    observed: &Observed,
+    bits: usize,
+    parameters: &Parameters,
+    disturbance: &Prediction,
+) -> Result<Demodulation> {
+    let job = Job::new(patches, carrier, observed, bits, parameters, &|_| ())?;
+    joint_of(&Job { solved, ..job }, disturbance)
+}
+
+fn joint_of(job: &Job, disturbance: &Prediction) -> Result<Demodulation> {
+    let parameters = job.parameters;
     let sums = job.sum_over_patches(|patch, basis, found, chips| {
         if found.rows.is_empty() {
-            return Sums::nothing(&job);
+            return Sums::nothing(job);
         }
         let weights: Vec<f64> =
             found.rows.iter().map(|&row| disturbance.weights[patch.vertices[row] as usize]).collect();
@@ -248,7 +266,7 @@ pub fn joint(
         let kernel = seen.kernel();
         let correlations = seen.correlations(&covariance.whiten(found.moved.clone()));
         let trace = kernel.trace();
-        Sums::new(&job, job.fold(&kernel, chips), correlations, chips, trace)
+        Sums::new(job, job.fold(&kernel, chips), correlations, chips, trace)
     })?;
     let amplitude_m = parameters.amplitude_m;
     let gram = Mat::from_fn(job.bits, job.bits, |j, l| amplitude_m * amplitude_m * sums.gram[(j, l)]);
@@ -276,6 +294,8 @@ fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
 
 struct Job<'a> {
     patches: &'a Patches,
+    /// The bases of the first patches, as far as they are known.
+    solved: &'a [Basis],
     carrier: &'a Carrier,
     observed: &'a Observed,
     /// Channel bits.
@@ -341,7 +361,7 @@ impl<'a> Job<'a> {
         assert_eq!(observed.len(), patches.vertex_count(), "one observation for every reference vertex");
         let carriers = patches.carriers(message_bits, parameters)?;
         let bits = carriers / parameters.chip_rate;
-        Ok(Job { patches, carrier, observed, bits, carriers, parameters, progress })
+        Ok(Job { patches, solved: &[], carrier, observed, bits, carriers, parameters, progress })
     }
 
     /// The bit of the i-th chip, counted from 0.
@@ -386,8 +406,9 @@ impl<'a> Job<'a> {
         let sum_block = |(index, patches): (usize, &[Patch])| -> Result<Sums> {
             let mut total: Option<Sums> = None;
             for (offset, patch) in patches.iter().enumerate() {
-                let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
-                let chips = [0, 1].map(|a| self.carrier.chips(index * block + offset, a, self.carriers));
+                let number = index * block + offset;
+                let basis = Basis::known_or_solved(self.solved, number, patch, self.carriers + 1)?;
+                let chips = [0, 1].map(|axis| self.carrier.chips(number, axis, self.carriers));
                 let found = Found::new(self.patches, patch, self.observed);
                 let sums = f(patch, &basis, &found, &chips);
                 match &mut total {

@@ -34,6 +34,58 @@ impl Spread {
     }
 }
 
+/// Hausdorff distances between features before and after, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hausdorff {
+    /// 99th percentile.
+    pub p99_m: f64,
+    /// The largest.
+    pub max_m: f64,
+}
+
+/// Changes of areas, as shares of the area before.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Areas {
+    /// Polygons and multipolygons.
+    pub polygons: usize,
+    /// Mean.
+    pub mean_change: f64,
+    /// 99th percentile.
+    pub p99_change: f64,
+    /// The largest.
+    pub max_change: f64,
+}
+
+/// Geometries that GEOS calls invalid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validity {
+    /// In the reference.
+    pub invalid_before: usize,
+    /// In the marked map.
+    pub invalid_after: usize,
+    /// Those that were valid before.
+    pub newly_invalid: usize,
+}
+
+/// Pairs of polygons that overlap by more than a sliver: 1e-6 m², or a cell of the output grid if there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Overlaps {
+    /// In the reference.
+    pub before: usize,
+    /// In the marked map.
+    pub after: usize,
+    /// Those that did not before, and have got more than a sliver in common.
+    pub new: usize,
+    /// Their area, m².
+    pub new_area_m2: f64,
+    /// Pairs that did not overlap before and do now, by a sliver.
+    pub new_slivers: usize,
+}
+
 /// How far the vertices moved, metres on the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

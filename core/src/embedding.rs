@@ -4,7 +4,7 @@ use crate::{
     Error, Result,
     carrier::{Carrier, bit_of_coefficient},
     deformation::{Deformation, Prediction},
-    demodulation::joint,
+    demodulation::joint_solved,
     distortion::{AngleChange, Displacement},
     key::SecretKey,
     map::Map,
@@ -60,6 +60,8 @@ pub struct Embedding<'a> {
     placement: Placement,
     tree: VertexTree<'a>,
     patches: Patches,
+    /// The bases of the first patches, when they are kept.
+    bases: Vec<Basis>,
     carrier: Carrier,
     carriers: usize,
     parameters: &'a Parameters,
@@ -83,7 +85,19 @@ impl<'a> Embedding<'a> {
         let tree = VertexTree::of_all(map);
         let patches = Patches::with_tree(map, &tree, parameters)?;
         let carriers = patches.carriers(bits, parameters)?;
-        Ok(Embedding { map, placement, tree, patches, carrier: Carrier::new(key), carriers, parameters })
+        let (bases, carrier) = (Vec::new(), Carrier::new(key));
+        Ok(Embedding { map, placement, tree, patches, bases, carrier, carriers, parameters })
+    }
+
+    /// For many messages: the bases of the patches that each of them is read back from are solved for once, and kept.
+    ///
+    /// # Errors
+    /// A patch that cannot be solved.
+    pub fn for_many(mut self) -> Result<Self> {
+        let first = self.patches.as_slice().par_iter().take(READ_BACK_PATCHES);
+        let bases = first.map(|patch| Basis::low_frequencies(patch, self.carriers + 1));
+        self.bases = bases.collect::<Result<_>>()?;
+        Ok(self)
     }
 
     /// How many patches there are.
@@ -136,7 +150,7 @@ impl<'a> Embedding<'a> {
         patch: &Patch,
         signs: &[Vec<f64>],
     ) -> Result<Vec<Vec<[f64; 2]>>> {
-        let basis = Basis::low_frequencies(patch, self.carriers + 1)?;
+        let basis = Basis::known_or_solved(&self.bases, number, patch, self.carriers + 1)?;
         let gain = match self.parameters.shape {
             Shape::Free => 1.0,
             Shape::Rigid => Response::new(patch, basis.vectors.subcols(1, self.carriers).to_owned()).gain(),
@@ -199,7 +213,8 @@ impl<'a> Embedding<'a> {
         };
         let read = |count: usize| {
             let (patches, bits) = (self.patches.head(count), message.len());
-            joint(&patches, &self.carrier, &observed, bits, self.parameters, &disturbance, &|_| ())
+            let from = (&patches, &self.bases[..]);
+            joint_solved(from, &self.carrier, &observed, bits, self.parameters, &disturbance)
         };
         if read(READ_BACK_PATCHES)?.message() == *message {
             return Ok(());

@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     code::Code,
-    distortion::{AngleChange, Displacement},
+    distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
     message::Message,
     options::{Laplacian, Parameters, Shape, Subject},
 };
@@ -53,7 +53,28 @@ pub struct Record {
     pub displacement: Displacement,
     /// How much the angles at its corners changed.
     pub angles: AngleChange,
+    /// How much the areas of its polygons changed.
+    pub areas: Areas,
+    /// How far its features are from where they were.
+    pub hausdorff: Hausdorff,
+    /// How many of them are invalid.
+    pub validity: Validity,
+    /// How many of its polygons overlap.
+    pub overlaps: Overlaps,
     /// What keeping the topology took.
+    pub topology: TopologyEntry,
+}
+
+/// What marking did to a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)] // the names are those of the record
+pub struct Distortion {
+    pub displacement: Displacement,
+    pub angles: AngleChange,
+    pub areas: Areas,
+    pub hausdorff: Hausdorff,
+    pub validity: Validity,
+    pub overlaps: Overlaps,
     pub topology: TopologyEntry,
 }
 
@@ -96,6 +117,19 @@ impl Record {
         let bits = record.message()?.len();
         record.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;
         Ok(record)
+    }
+
+    /// What it says of the map's distortion.
+    pub fn distortion(&self) -> Distortion {
+        Distortion {
+            displacement: self.displacement,
+            angles: self.angles,
+            areas: self.areas,
+            hausdorff: self.hausdorff,
+            validity: self.validity,
+            overlaps: self.overlaps,
+            topology: self.topology,
+        }
     }
 
     /// The text of the record.

@@ -10,6 +10,7 @@ use rand_chacha::{
     ChaCha20Rng,
     rand_core::{Rng, SeedableRng},
 };
+use std::borrow::Cow;
 
 /// Eigenvalues closer than this are one subspace: its basis is chosen by [`canonical_rotation`], not
 /// by the solver.
@@ -62,6 +63,19 @@ impl Basis {
         vectors.truncate(n, count);
         let norms_squared = to_unit_columns(&mut vectors, &degrees);
         Ok(Basis { vectors, eigenvalues: values[..count].to_vec(), degrees, norms_squared })
+    }
+
+    /// That of patch `number`, if it is among the `known` ones of the first patches, else solved for.
+    pub(crate) fn known_or_solved<'a>(
+        known: &'a [Basis],
+        number: usize,
+        patch: &Patch,
+        count: usize,
+    ) -> Result<Cow<'a, Self>> {
+        match known.get(number) {
+            Some(basis) => Ok(Cow::Borrowed(basis)),
+            None => Ok(Cow::Owned(Self::low_frequencies(patch, count)?)),
+        }
     }
 
     /// Analysis with the dual basis: the k coefficients of `values` (n of them, one axis).

@@ -230,7 +230,7 @@ fn messages_marked_together_are_those_marked_alone() {
     for parameters in [small(), Parameters { shape: meshmark_core::options::Shape::Rigid, ..small() }] {
         let messages =
             [MESSAGE, "fedcba9876543210", "00ff00ff00ff00ff"].map(|h| Message::from_hex(h).unwrap());
-        let embedding = Embedding::new(&map, &key(), 64, &parameters).unwrap();
+        let embedding = Embedding::new(&map, &key(), 64, &parameters).unwrap().for_many().unwrap();
         let steps = std::sync::atomic::AtomicUsize::new(0);
         let wanted = embedding.wanted(&messages, &|n| {
             steps.fetch_add(n, std::sync::atomic::Ordering::Relaxed);

@@ -179,7 +179,6 @@ proptest! {
         let town = sketch.survey();
         let marked = town.mark(&Parameters { shape, laplacian, ..parameters() });
         prop_assert_eq!(crossings(&town.segments, town.coords()), crossings(&town.segments, &marked.coords));
-        prop_assert!(marked.attenuated > 0);
         for &[a, b] in &town.segments {
             let [a, b] = [a as usize, b as usize];
             for v in (0..town.coords().len()).filter(|v| *v != a && *v != b) {
@@ -249,7 +248,9 @@ fn the_same_for_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
         pool.install(|| town.mark(&parameters()))
     };
-    assert_eq!(with_threads(1), with_threads(3));
+    let marked = with_threads(1);
+    assert_eq!(marked, with_threads(3));
+    assert!(marked.attenuated > 0, "the town is so dense that something has to give way");
 }
 
 #[test]

@@ -1,10 +1,6 @@
 //! Geometries one by one, for comparing two maps feature by feature.
 
-use crate::{
-    Error, Result,
-    survey::chosen_layers,
-    wkb::{self, Step},
-};
+use crate::{Error, Outline, Result, survey::chosen_layers};
 use gdal::{Dataset, vector::LayerAccess};
 
 /// One geometry of a dataset.
@@ -14,10 +10,8 @@ pub struct FeatureGeometry {
     pub layer: String,
     /// The feature's id, when it has one.
     pub fid: Option<u64>,
-    /// Well-known binary.
-    pub wkb: Vec<u8>,
-    /// Its rings, lines and points: coordinates in CRS units, a ring closed by its first one.
-    pub chains: Vec<Vec<[f64; 2]>>,
+    /// Itself.
+    pub outline: Outline,
 }
 
 /// The geometries of all features of the chosen layers (all when `None`), in the order of the dataset; features
@@ -41,12 +35,14 @@ pub fn features(
                 let fid = feature.fid();
                 let id = || fid.map_or("without id".into(), |fid| fid.to_string());
                 let failed = |reason: String| Error::Geometry { layer: name.clone(), fid: id(), reason };
-                let mut wkb = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
-                let chains = chains(&mut wkb).map_err(|error| failed(error.to_string()))?;
-                if let Some(&[x, y]) = chains.iter().flatten().find(|p| !p.iter().all(|v| v.is_finite())) {
+                let wkb = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
+                let outline = Outline::of_wkb(wkb).map_err(|error| failed(error.to_string()))?;
+                if let Some(&[x, y]) =
+                    outline.chains.iter().flatten().find(|p| !p.iter().all(|v| v.is_finite()))
+                {
                     return Err(Error::NotFinite { layer: name.clone(), fid: id(), x, y });
                 }
-                all.push(FeatureGeometry { layer: name.clone(), fid, wkb, chains });
+                all.push(FeatureGeometry { layer: name.clone(), fid, outline });
             }
         }
         if let Some(reason) = last_failure() {
@@ -54,16 +50,4 @@ pub fn features(
         }
     }
     Ok(all)
-}
-
-fn chains(wkb: &mut [u8]) -> std::result::Result<Vec<Vec<[f64; 2]>>, wkb::WkbError> {
-    let mut chains: Vec<Vec<[f64; 2]>> = Vec::new();
-    wkb::map_coordinates::<wkb::WkbError>(wkb, &mut |step, point| {
-        match (step, chains.last_mut()) {
-            (Step::Next, Some(chain)) => chain.push(point),
-            _ => chains.push(vec![point]),
-        }
-        Ok(point)
-    })?;
-    Ok(chains)
 }

@@ -1,16 +1,22 @@
 //! A marking, apart from where its source comes from and where its result goes.
 
-use crate::{Error, Result, Survey, wkb};
+use crate::{
+    Error, Geometries, Result, Survey,
+    quality::{Comparison, Outlines, Quality, State},
+    wkb,
+};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::{
     embedding::Marked,
+    ground::Ground,
     key::SecretKey,
     map::Map,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Spelling, Subject},
-    record::{self, Record, Reference, TopologyEntry},
+    record::{self, Distortion, Record, Reference, TopologyEntry},
     vertices::VertexTable,
 };
+use std::borrow::Cow;
 
 /// Where the vertices of a map go.
 #[derive(Clone, Copy)]
@@ -42,17 +48,14 @@ impl Moves<'_> {
 }
 
 /// Why a geometry was not moved.
+#[derive(Debug, thiserror::Error)]
 pub enum NotMoved {
     /// Its coordinate is not in the table.
+    #[error("({}, {}) was not there when the map was read", .0[0], .0[1])]
     UnknownVertex([f64; 2]),
     /// Its bytes make no sense.
-    Wkb(wkb::WkbError),
-}
-
-impl From<wkb::WkbError> for NotMoved {
-    fn from(error: wkb::WkbError) -> Self {
-        NotMoved::Wkb(error)
-    }
+    #[error(transparent)]
+    Wkb(#[from] wkb::WkbError),
 }
 
 /// Smaller than so many tolerances a map would be noise after its marking.
@@ -132,15 +135,61 @@ pub fn reference(map: &Survey, patches: usize) -> Reference {
     }
 }
 
+/// The unmarked geometries of a map, to which any marked copy is compared.
+pub struct Unmarked<'a> {
+    geometries: &'a Geometries,
+    coords: &'a [[f64; 2]],
+    ground: Ground,
+    state: State,
+}
+
+impl<'a> Unmarked<'a> {
+    /// Looks at all geometries of a map.
+    pub fn new(geometries: &'a Geometries, map: &Map<'a>) -> Self {
+        let coords = map.vertices.coords();
+        let state = State::of(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
+        Unmarked { geometries, coords, ground: map.ground, state }
+    }
+
+    /// What marking changed.
+    pub fn distortion(&self, marked: &Marked, parameters: &Parameters) -> Distortion {
+        let get_before = |number| Cow::Owned(self.geometries.outline(number, self.coords));
+        let get_after = |number| Cow::Owned(self.geometries.outline(number, &marked.coords));
+        let [before, after] = [outlines(self.geometries, &get_before), outlines(self.geometries, &get_after)];
+        let state = State::of(after);
+        let grid = parameters.precision.unwrap_or(0.0);
+        let comparison =
+            Comparison { before: (before, &self.state), after: (after, &state), ground: self.ground, grid };
+        let Quality { areas, hausdorff, validity, overlaps, .. } = comparison.quality();
+        Distortion {
+            displacement: marked.displacement,
+            angles: marked.angles,
+            areas,
+            hausdorff,
+            validity,
+            overlaps,
+            topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
+        }
+    }
+}
+
+fn outlines<'a>(
+    geometries: &Geometries,
+    get: &'a (dyn Fn(usize) -> Cow<'a, crate::Outline> + Sync),
+) -> Outlines<'a> {
+    Outlines { count: geometries.len(), get }
+}
+
 /// The record of a marking.
 pub fn record(
     options: &Options,
     subject: &Subject,
     key: &SecretKey,
     reference: Reference,
-    marked: &Marked,
+    distortion: Distortion,
 ) -> Record {
     let parameters = &options.parameters;
+    let Distortion { displacement, angles, areas, hausdorff, validity, overlaps, topology } = distortion;
     Record {
         meshmark_record: record::VERSION,
         software: concat!("meshmark ", env!("CARGO_PKG_VERSION")).into(),
@@ -161,8 +210,12 @@ pub fn record(
         layers: options.layers.clone(),
         srs: options.srs.clone(),
         reference,
-        displacement: marked.displacement,
-        angles: marked.angles,
-        topology: TopologyEntry { t_junctions: marked.junctions, attenuated_vertices: marked.attenuated },
+        displacement,
+        angles,
+        areas,
+        hausdorff,
+        validity,
+        overlaps,
+        topology,
     }
 }

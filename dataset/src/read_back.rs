@@ -65,6 +65,27 @@ impl Comparison<'_> {
         }
     }
 
+    /// Compares a layer with coordinates in the order of its features, not one bit of which may differ.
+    ///
+    /// # Errors
+    /// The difference, in a few words.
+    pub fn in_order(
+        &self,
+        mut in_file: Layer,
+        mut meant: impl Iterator<Item = [f64; 2]>,
+    ) -> Result<(), String> {
+        for feature in in_file.features() {
+            if coords(&feature)?.into_iter().any(|point| meant.next() != Some(point)) {
+                return Err("other coordinates".into());
+            }
+        }
+        match ((self.last_failure)(), meant.next()) {
+            (Some(reason), _) => Err(reason),
+            (None, Some(_)) => Err("another number of coordinates".into()),
+            (None, None) => Ok(()),
+        }
+    }
+
     fn features(&self, a: Vec<[f64; 2]>, b: Vec<[f64; 2]>) -> Result<(), String> {
         if a.len() != b.len() {
             return Err("another number of coordinates".into());

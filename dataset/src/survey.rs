@@ -1,7 +1,7 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    CoordinateSystem, Error, Label, Result, Shape, crs, labels, parse_srs, shapes,
+    CoordinateSystem, Error, Geometries, Label, Result, Shape, crs, labels, parse_srs, shapes,
     wkb::{self, Step},
 };
 use gdal::{
@@ -9,6 +9,7 @@ use gdal::{
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{disjoint_sets::DisjointSets, ground::Ground, map::Map, vertices::VertexTable};
+use std::collections::BTreeMap;
 
 /// Which attributes become labels. With labels come shapes: both are for registration.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +54,8 @@ pub struct Selection<'a> {
     pub labels: LabelFields<'a>,
     /// Which CRS the coordinates shall be in.
     pub target: Target<'a>,
+    /// Whether to keep what the geometries are made of.
+    pub geometries: bool,
     /// Refuse a map of more vertices, duplicates included.
     pub most_vertices: usize,
     /// What GDAL's last failure was, if there was one since the walk began: drivers end a layer early on a
@@ -68,6 +71,7 @@ impl Default for Selection<'_> {
             srs: None,
             labels: LabelFields::None,
             target: Target::Own,
+            geometries: false,
             most_vertices: crate::MOST_VERTICES,
             last_failure: &|| None,
         }
@@ -91,6 +95,8 @@ pub struct Survey {
     pub labels: Vec<Label>,
     /// Rings and lines.
     pub shapes: Vec<Shape>,
+    /// The geometries in the order they were read, if they were asked for.
+    pub geometries: Option<Geometries>,
 }
 
 impl Survey {
@@ -124,7 +130,16 @@ impl Survey {
         let of_shapes = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
         of_shapes.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
         let ground = Some(crs::ground(Some(crs), &vertices)?);
-        Ok(Survey { vertices, segments, polygons, crs: Some(crs.clone()), ground, labels, shapes })
+        Ok(Survey {
+            vertices,
+            segments,
+            polygons,
+            crs: Some(crs.clone()),
+            ground,
+            labels,
+            shapes,
+            geometries: None,
+        })
     }
 
     /// Metres on the ground.
@@ -161,16 +176,18 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Target::Crs(target) => Some(target.clone()),
         Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
-    let Chains { coords, starts, kinds } = walk.chains;
-    let (vertices, indices) = VertexTable::indexed(coords)?;
-    let segments = segments(&indices, &starts);
-    let polygons = polygons(&indices, &starts, &kinds, vertices.len());
+    let mut chains = walk.chains;
+    let (vertices, indices) = VertexTable::indexed(std::mem::take(&mut chains.coords))?;
+    let segments = segments(&indices, &chains.starts);
+    let polygons = polygons(&indices, &chains.starts, &chains.kinds, vertices.len());
     let ground = match crs::ground(crs.as_ref(), &vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
-    Ok(Survey { vertices, segments, polygons, crs, ground, labels: walk.labels, shapes: walk.shapes })
+    let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
+    let (labels, shapes) = (walk.labels, walk.shapes);
+    Ok(Survey { vertices, segments, polygons, crs, ground, labels, shapes, geometries })
 }
 
 /// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
@@ -188,15 +205,23 @@ pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Res
 
 /// Coordinates of rings, lines and points, one after the other.
 #[derive(Clone, Default)]
-struct Chains {
+pub(crate) struct Chains {
     coords: Vec<[f64; 2]>,
     /// Where in `coords` each of them starts, ascending.
-    starts: Vec<u32>,
+    pub(crate) starts: Vec<u32>,
     /// What each of them is.
-    kinds: Vec<Step>,
+    pub(crate) kinds: Vec<Step>,
+    /// Which of them is the first of each geometry, ascending.
+    pub(crate) firsts: Vec<u32>,
+    /// The geometries that are more than their chains, by their numbers.
+    pub(crate) others: BTreeMap<u32, Vec<u8>>,
 }
 
 impl Chains {
+    fn begin_geometry(&mut self) {
+        self.firsts.push(self.starts.len() as u32);
+    }
+
     fn push(&mut self, step: Step, point: [f64; 2]) {
         if step != Step::Next {
             self.starts.push(self.coords.len() as u32);
@@ -206,7 +231,11 @@ impl Chains {
     }
 
     fn append(&mut self, other: &mut Chains) {
-        let offset = self.coords.len() as u32;
+        let (of_starts, offset) = (self.starts.len() as u32, self.coords.len() as u32);
+        let geometries = self.firsts.len() as u32;
+        let others = std::mem::take(&mut other.others);
+        self.others.extend(others.into_iter().map(|(number, wkb)| (number + geometries, wkb)));
+        self.firsts.extend(other.firsts.drain(..).map(|first| first + of_starts));
         self.starts.extend(other.starts.drain(..).map(|start| start + offset));
         self.coords.append(&mut other.coords);
         self.kinds.append(&mut other.kinds);
@@ -260,7 +289,7 @@ impl Walk<'_> {
         let mut of_column = vec![Chains::default(); columns.len()];
         for feature in layer.features() {
             for (column, chains) in of_column.iter_mut().enumerate() {
-                read_geometry(&feature, column, name, chains)?;
+                read_geometry(&feature, column, name, self.selection.geometries, chains)?;
             }
             let vertices =
                 self.chains.coords.len() + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
@@ -346,9 +375,21 @@ impl Walk<'_> {
 }
 
 /// Appends the coordinates of one geometry of a feature.
-fn read_geometry(feature: &Feature, column: usize, layer: &str, chains: &mut Chains) -> Result<()> {
+fn read_geometry(
+    feature: &Feature,
+    column: usize,
+    layer: &str,
+    keeps_geometries: bool,
+    chains: &mut Chains,
+) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
     let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
+    let failed = |reason: String| Error::Geometry { layer: layer.into(), fid: fid(), reason };
+    let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
+    if keeps_geometries && !wkb::is_plain(&bytes) {
+        chains.others.insert(chains.firsts.len() as u32, bytes.clone());
+    }
+    chains.begin_geometry();
     let mut visit = |step, [x, y]: [f64; 2]| {
         if !x.is_finite() || !y.is_finite() {
             return Err(Error::NotFinite { layer: layer.into(), fid: fid(), x, y });
@@ -356,8 +397,6 @@ fn read_geometry(feature: &Feature, column: usize, layer: &str, chains: &mut Cha
         chains.push(step, [x, y]);
         Ok([x, y])
     };
-    let failed = |reason: String| Error::Geometry { layer: layer.into(), fid: fid(), reason };
-    let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
     match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
         visit(step, point).map_err(Visit::Ours)
     }) {
@@ -425,14 +464,7 @@ mod tests {
         }
         let layers = ["roads".to_string()];
         for layers in [None, Some(&layers[..])] {
-            let selection = Selection {
-                layers,
-                srs: None,
-                labels: LabelFields::None,
-                target: Target::Own,
-                most_vertices: 10,
-                last_failure: &|| None,
-            };
+            let selection = Selection { layers, most_vertices: 10, ..Selection::default() };
             let map = survey(&dataset, &selection).unwrap();
             assert_eq!(map.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }

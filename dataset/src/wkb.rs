@@ -11,6 +11,8 @@ pub enum WkbError {
     UnknownType(u32),
     #[error("the geometry is nested more than {MOST_NESTED} deep")]
     TooDeep,
+    #[error("the geometry does not begin as those of a GeoPackage do")]
+    NoHeader,
 }
 
 const MOST_NESTED: usize = 64;
@@ -38,6 +40,62 @@ pub fn map_coordinates<E: From<WkbError>>(
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
 ) -> Result<(), E> {
     Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
+}
+
+/// The bytes of a geometry of these chains, each with what it begins as: polygons with their holes, lines, and points
+/// for what has one vertex; a multi-geometry or a collection when there are several.
+pub fn of_chains(chains: &[Vec<[f64; 2]>], kinds: &[Step]) -> Vec<u8> {
+    let mut parts: Vec<(u32, Vec<u8>)> = Vec::new();
+    let mut rest = chains.iter().zip(kinds).peekable();
+    while let Some((chain, kind)) = rest.next() {
+        match kind {
+            Step::Shell => {
+                let mut rings = vec![chain];
+                while let Some((hole, _)) = rest.next_if(|(_, kind)| **kind == Step::Hole) {
+                    rings.push(hole);
+                }
+                let mut polygon = count_bytes(rings.len());
+                rings.iter().for_each(|ring| polygon.extend(sequence_bytes(ring)));
+                parts.push((3, polygon));
+            }
+            _ if chain.len() == 1 => parts.push((1, sequence_bytes(chain).split_off(4))),
+            _ => parts.push((2, sequence_bytes(chain))),
+        }
+    }
+    let mut bytes = Vec::new();
+    if parts.len() != 1 {
+        let first = parts.first().map_or(7, |part| part.0);
+        let is_multi = !parts.is_empty() && parts.iter().all(|part| part.0 == first);
+        bytes.extend(head(if is_multi { first + 3 } else { 7 }));
+        bytes.extend(count_bytes(parts.len()));
+    }
+    for (kind, part) in parts {
+        bytes.extend(head(kind));
+        bytes.extend(part);
+    }
+    bytes
+}
+
+fn head(kind: u32) -> Vec<u8> {
+    [&[1][..], &kind.to_le_bytes()].concat()
+}
+
+fn count_bytes(count: usize) -> Vec<u8> {
+    (count as u32).to_le_bytes().into()
+}
+
+fn sequence_bytes(chain: &[[f64; 2]]) -> Vec<u8> {
+    let mut bytes = count_bytes(chain.len());
+    chain.iter().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
+    bytes
+}
+
+/// Whether a legal geometry is of points, lines or polygons. All others may have arcs, which are more than their
+/// coordinates.
+pub(crate) fn is_plain(wkb: &[u8]) -> bool {
+    let code = wkb.get(1..5).and_then(|code| code.try_into().ok()).unwrap_or_default();
+    let code = if wkb.first() == Some(&1) { u32::from_le_bytes(code) } else { u32::from_be_bytes(code) };
+    matches!(decode_type(code).0, 1..=6)
 }
 
 struct Cursor<'a> {

@@ -55,8 +55,43 @@ fn enrich(host: &Host) {
     let line = r#"{"type":"Feature","properties":{},"geometry":{"type":"LineString",
         "coordinates":[[497000,6710700,1.5],[497010,6710710,2.5]]}}"#;
     fs::write(host.path("heights.geojson"), line).unwrap();
+    let arc = "CIRCULARSTRING (497000 6710700,497001 6710703,497010 6710700)";
+    let arcs = format!("id,WKT\n1,\"{arc}\"\n2,\"CIRCULARSTRING EMPTY\"\n3,\n");
+    fs::write(host.path("arcs.csv"), arcs).unwrap();
     host.run("ogr2ogr", &["-update", "map.gpkg", "notes.csv"]).succeeds();
+    let curved = ["arcs.csv", "-oo", "KEEP_GEOM_COLUMNS=NO", "-a_srs", "EPSG:3067", "-nlt", "CIRCULARSTRING"];
+    host.run("ogr2ogr", &[&["-update", "map.gpkg"], &curved[..]].concat()).succeeds();
     host.run("ogr2ogr", &["-update", "-a_srs", "EPSG:3067", "map.gpkg", "heights.geojson"]).succeeds();
+}
+
+/// What an SQL statement answers about a GeoPackage, one value a line.
+fn answer(host: &Host, map: &str, sql: &str) -> String {
+    let text = host.run("ogrinfo", &["-q", map, "-sql", sql]).succeeds().stdout;
+    text.lines().filter_map(|line| Some(line.split_once(" = ")?.1)).collect::<Vec<_>>().join("\n")
+}
+
+/// Every geometry has the same bytes in both, header and all; the indexes of the first are sound, hold the features that
+/// those of the second hold, and their boxes are no larger.
+fn bytes_and_indexes_agree(host: &Host, copy: &str, driver: &str) {
+    for layer in ["buildings", "roads", "heights", "arcs"] {
+        let bytes = format!("SELECT hex(geom) AS h FROM {layer} WHERE geom NOT NULL ORDER BY fid");
+        assert!(answer(host, copy, &bytes) == answer(host, driver, &bytes), "{layer}");
+        let has_index = format!("SELECT HasSpatialIndex('{layer}', 'geom')");
+        assert_eq!(answer(host, copy, &has_index), "1", "{layer}");
+        assert_eq!(answer(host, copy, &format!("SELECT rtreecheck('rtree_{layer}_geom')")), "ok", "{layer}");
+        let table = format!("rtree_{layer}_geom");
+        let ids = format!("SELECT id FROM {table} ORDER BY id");
+        assert_eq!(answer(host, copy, &ids), answer(host, driver, &ids), "{layer}");
+        let outside = format!(
+            "SELECT count(*) FROM {layer} t JOIN {table} r ON t.fid = r.id WHERE minx > ST_MinX(geom) OR maxx < \
+             ST_MaxX(geom) OR miny > ST_MinY(geom) OR maxy < ST_MaxY(geom)"
+        );
+        assert_eq!(answer(host, copy, &outside), "0", "{layer}");
+        let sides = format!("SELECT minx, -maxx AS x, miny, -maxy AS y FROM {table} ORDER BY id");
+        let [ours, gdal] = [copy, driver].map(|map| answer(host, map, &sides));
+        let numbers = |text: &str| text.lines().map(|n| n.parse().unwrap()).collect::<Vec<f64>>();
+        assert!(numbers(&ours).iter().zip(numbers(&gdal)).all(|(ours, gdal)| *ours >= gdal), "{layer}");
+    }
 }
 
 #[test]
@@ -75,9 +110,7 @@ fn records_and_geopackages_are_those_of_the_driver() {
         assert_eq!(read(&format!("out/{stem}.json")), read("driver.json"));
         assert!(contents::read(&host.path(&copy)) == contents::read(&host.path("driver.gpkg")));
         assert_eq!(summary(&host, &copy), summary(&host, "driver.gpkg"));
-        let index = "SELECT HasSpatialIndex('buildings', 'geom')";
-        let index = host.run("ogrinfo", &["-q", &copy, "-sql", index]).succeeds().stdout;
-        assert!(index.contains("HasSpatialIndex (Integer) = 1"), "{index}");
+        bytes_and_indexes_agree(&host, &copy, "driver.gpkg");
         host.matches("map.gpkg", &["--record", &format!("out/{stem}.json"), &copy]);
         for name in ["driver.gpkg", "driver.json"] {
             fs::remove_file(host.path(name)).unwrap();
@@ -127,6 +160,18 @@ fn one_layer_goes_into_every_format_as_by_the_driver() {
     assert_eq!(refused.code, Some(2));
     assert!(refused.stderr.contains("the map map.gpkg: FlatGeobuf holds one layer"), "{}", refused.stderr);
     assert!(!host.path("many").exists());
+}
+
+#[test]
+fn what_ogr2ogr_warns_of_is_said_once() {
+    let host = host();
+    let sql = "ALTER TABLE buildings ADD COLUMN longer_than_ten TEXT";
+    host.run("ogrinfo", &["-q", "map.gpkg", "-sql", sql]).succeeds();
+    host.run("ogr2ogr", &["-f", "GPKG", "one.gpkg", "map.gpkg", "buildings"]).succeeds();
+    let said = distribute(&host, "out", "one.gpkg", &["-f", "ESRI Shapefile"], "2").succeeds().stderr;
+    let cut = "meshmark: ogr2ogr: Normalized/laundered field name: 'longer_than_ten' to 'longer_tha'";
+    assert_eq!(said.lines().filter(|line| *line == cut).count(), 1, "{said}");
+    assert!(!said.contains(".meshmark-write-"), "{said}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! to break triangulations.
 
 use meshmark_core::{mesh::Mesh, vertices::VertexTable};
-use meshmark_dataset::{LabelFields, MOST_VERTICES, Selection, Target, survey};
+use meshmark_dataset::{Selection, Target, survey};
 use meshmark_host_tests::{cgal, delaunay_check::differing_edges_are_cocircular};
 use rand_chacha::{ChaCha20Rng, rand_core::Rng, rand_core::SeedableRng};
 use std::path::{Path, PathBuf};
@@ -73,14 +73,7 @@ fn random_with_duplicates() -> Vec<[f64; 2]> {
 }
 
 fn vertices_of(map: &Path) -> VertexTable {
-    let everything = Selection {
-        layers: None,
-        srs: None,
-        labels: LabelFields::None,
-        target: Target::Raw,
-        most_vertices: MOST_VERTICES,
-        last_failure: &|| None,
-    };
+    let everything = Selection { target: Target::Raw, ..Selection::default() };
     survey(&gdal::Dataset::open(map).unwrap(), &everything).unwrap().vertices
 }
 

@@ -111,6 +111,18 @@ impl Drop for Collector {
     }
 }
 
+/// Lets GDAL be silent on this thread, until [`unhush`].
+pub fn hush() {
+    // SAFETY: GDAL's own handler, which lives as long as GDAL does.
+    unsafe { gdal_sys::CPLPushErrorHandler(Some(gdal_sys::CPLQuietErrorHandler)) };
+}
+
+/// Ends what [`hush`] began, on the same thread.
+pub fn unhush() {
+    // SAFETY: pops the handler that `hush` pushed; without one, GDAL does nothing.
+    unsafe { gdal_sys::CPLPopErrorHandler() };
+}
+
 unsafe extern "C" fn collect(class: CPLErr::Type, number: CPLErrorNum, message: *const c_char) {
     // SAFETY: GDAL calls handlers with a C string; the user data is that of `Collector::new`,
     // whose box lives as long as this handler is installed.

@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    output, record_file,
+    ffi_errors, output, record_file,
     source_files::SourceFiles,
 };
 use gdal::Dataset;
@@ -15,7 +15,7 @@ use meshmark_core::{
 };
 use meshmark_dataset::{
     LabelFields, MOST_VERTICES, Selection, Survey, Target,
-    marking::{self, Moves},
+    marking::{self, Moves, Unmarked},
     same_file, survey,
 };
 use std::{fs::File, io::Read, path::Path};
@@ -79,7 +79,9 @@ impl Request {
 }
 
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    // GEOS says what it does not like about invalid geometries, on the thread that asks it.
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let pool = builder.start_handler(|_| ffi_errors::hush()).exit_handler(|_| ffi_errors::unhush()).build();
     pool.map_err(|error| Error::Threads(error.to_string()))
 }
 
@@ -111,8 +113,8 @@ pub struct Marking {
     moved: Vec<[f64; 2]>,
     layers: Option<Vec<String>>,
     files: SourceFiles,
-    /// The text of its record.
-    pub record: String,
+    /// The text of its record, if somebody wants it.
+    pub record: Option<String>,
     /// Sentences the user should read though nothing failed.
     pub warnings: Vec<String>,
 }
@@ -123,15 +125,22 @@ impl Marking {
         let options = &request.options;
         check_record_is_no_source(options, &source.files)?;
         output::check_is_not_source(&source.files)?;
-        let map = survey(source.dataset, &selection(options, source.last_failure))?;
+        let mut map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map()?;
         marking::check_extent(&on_ground, &options.parameters)?;
         let message = request.subject.message(&request.key);
-        let marked = pool(threads)?
-            .install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
-        let reference = marking::reference(&map, marked.patches);
-        let record = marking::record(options, &request.subject, &request.key, reference, &marked).to_json();
+        let pool = pool(threads)?;
+        let marked =
+            pool.install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
+        let record = map.geometries.as_ref().map(|geometries| {
+            let parameters = &options.parameters;
+            let distortion =
+                pool.install(|| Unmarked::new(geometries, &on_ground).distortion(&marked, parameters));
+            let reference = marking::reference(&map, marked.patches);
+            marking::record(options, &request.subject, &request.key, reference, distortion).to_json()
+        });
+        map.geometries = None;
         let spelling = Spelling::OpenOption;
         let mut warnings = marking::warnings(&options.parameters, &message, &map, marked.patches, spelling);
         warnings.extend(marking::coordinates_as_text(source.dataset));
@@ -148,8 +157,8 @@ impl Marking {
 
     /// Writes the record where the request wants it.
     pub fn write_record(&self, request: &Request) -> Result<()> {
-        let path = request.record_path();
-        path.map_or(Ok(()), |path| record_file::write(path, &self.record))
+        let wanted = request.record_path().zip(self.record.as_deref());
+        wanted.map_or(Ok(()), |(path, text)| record_file::write(path, text))
     }
 
     /// Fails unless the message can be demodulated from where the vertices were found: their new places as
@@ -206,6 +215,7 @@ fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<Stri
         srs: options.srs.as_deref(),
         labels: LabelFields::None,
         target: Target::Own,
+        geometries: options.record_path.is_some(),
         most_vertices: MOST_VERTICES,
         last_failure,
     }

@@ -216,7 +216,7 @@ impl Writer {
         let warnings = view.marking().warnings.clone();
         let record = view.marking().record.clone();
         drop((view, schema));
-        publish(&target, &places, &folder, &record)?;
+        publish(&target, &places, &folder, record.as_deref())?;
         Ok(warnings)
     }
 
@@ -307,9 +307,9 @@ fn write_marked(
 }
 
 /// Puts record, reference and the files in `folder` into their places.
-fn publish(target: &Target, places: &Places, folder: &Path, record: &str) -> Result<()> {
+fn publish(target: &Target, places: &Places, folder: &Path, record: Option<&str>) -> Result<()> {
     let mut publication = Publication { overwrite: target.replaces, ..Publication::default() };
-    if let Some((staged, to)) = &places.record {
+    if let Some(((staged, to), record)) = places.record.as_ref().zip(record) {
         fs::write(staged, record).map_err(|e| file_error("writing", staged, e))?;
         let is_there = fs::read(to).is_ok_and(|bytes| bytes == record.as_bytes());
         if !is_there {

@@ -97,6 +97,8 @@ pub struct Reading<'a> {
     pub srs: Option<&'a str>,
     /// Attributes to take as landmarks.
     pub landmarks: LabelFields<'a>,
+    /// Whether to keep its geometries.
+    pub geometries: bool,
 }
 
 /// Reads the reference: any vector dataset GDAL opens.
@@ -122,7 +124,7 @@ pub(crate) fn source(path: &Path, options: &Options, warn: &mut dyn FnMut(&str))
     }
     let dataset = open("map", path, None)?;
     marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
-    read("map", path, &dataset, &reading_of(options), Target::Own)
+    read("map", path, &dataset, &Reading { geometries: true, ..reading_of(options) }, Target::Own)
 }
 
 /// Reads the vertices and the names of all layers of a copy of such a map.
@@ -134,20 +136,29 @@ pub(crate) fn staged(path: &Path, options: &Options) -> Result<(Survey, Vec<Stri
 
 fn reading_of(options: &Options) -> Reading<'_> {
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
-    Reading { layers, srs, landmarks: LabelFields::None }
+    Reading { layers, srs, landmarks: LabelFields::None, geometries: false }
 }
 
-/// The geometries of a map in order, for a comparison.
-pub fn geometries(what: &str, path: &Path, layers: Option<&[String]>) -> Result<Vec<FeatureGeometry>> {
+/// The geometries of a map in order, for a comparison, and the first CRS of a layer.
+pub fn geometries(
+    what: &str,
+    path: &Path,
+    layers: Option<&[String]>,
+) -> Result<(Vec<FeatureGeometry>, Option<CoordinateSystem>)> {
     let dataset = open(what, path, None)?;
     forget_failure();
     let found = features(&dataset, layers, &last_failure);
-    found.map_err(|error| of_map(what, path, &error))
+    Ok((found.map_err(|error| of_map(what, path, &error))?, first_crs(&dataset)))
+}
+
+fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
+    dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer)
 }
 
 /// Metres on the ground of the reference of a comparison.
 pub fn ground(path: &Path, layers: Option<&[String]>) -> Result<Ground> {
-    let survey = reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None })?;
+    let survey =
+        reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
     survey.ground().map_err(|error| of_map("reference", path, &error))
 }
 
@@ -183,7 +194,7 @@ pub struct Suspect {
 pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
     let dataset = open_suspect(path)?;
     let layer_crs = crs_of(&dataset);
-    let crs = dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer);
+    let crs = first_crs(&dataset);
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
         match survey_of(&dataset, reading, Target::Crs(target)) {
             Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
@@ -338,6 +349,7 @@ fn survey_of(dataset: &Dataset, reading: &Reading, target: Target) -> meshmark_d
         srs: reading.srs,
         labels: reading.landmarks,
         target,
+        geometries: reading.geometries,
         most_vertices: MOST_VERTICES,
         last_failure: &last_failure,
     };

@@ -131,7 +131,10 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
 pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Survey> {
     progress.start("reading", 0);
     let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
-    reading::reference(&request.reference, &Reading { layers, srs, landmarks: request.landmarks() })
+    reading::reference(
+        &request.reference,
+        &Reading { layers, srs, landmarks: request.landmarks(), geometries: false },
+    )
 }
 
 /// Registers, matches and demodulates the suspect of a request.
@@ -142,7 +145,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     let map = reference.map().map_err(|error| of_reference(request, error))?;
     let ground = map.ground;
     progress.start("reading", 0);
-    let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All };
+    let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
     let suspect = reading::suspect(&request.suspect, &plain, reference)?;
     let suspect_crs = suspect.layer_crs.clone();
 

@@ -66,6 +66,9 @@ fn make_files(folder: &Path) {
         copy("vectors/marked.gpkg", &format!("{name}/acme-gmbh-f384e512.gpkg"));
     }
     copy("vectors/record.json", "copies/acme-gmbh-f384e512.json");
+    let reprojected = ["-q", "-t_srs", "EPSG:3857", "in_another_crs.gpkg", "marked.gpkg"];
+    let status = Command::new("ogr2ogr").args(reprojected).current_dir(folder).status();
+    assert!(status.unwrap().success());
     write("truncated.gpkg", &fs::read(folder.join("marked.gpkg")).unwrap()[..100_000]);
     write(
         "marked.vrt",

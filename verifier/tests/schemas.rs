@@ -2,7 +2,7 @@
 
 use meshmark_core::{
     code::Code,
-    distortion::{AngleChange, Displacement},
+    distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
     options::{Kind, Laplacian, OPTIONS, Shape},
     record::{Record, Reference, TopologyEntry},
 };
@@ -89,6 +89,10 @@ fn record() -> Record {
         reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
         displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },
         angles: AngleChange::of(&[[90.0, 91.0], [200.0, 190.0]]),
+        areas: Areas { polygons: 1, mean_change: 0.01, p99_change: 0.01, max_change: 0.01 },
+        hausdorff: Hausdorff { p99_m: 0.2, max_m: 0.3 },
+        validity: Validity { invalid_before: 1, invalid_after: 1, newly_invalid: 0 },
+        overlaps: Overlaps { before: 2, after: 2, new: 0, new_area_m2: 0.0, new_slivers: 1 },
         topology: TopologyEntry { t_junctions: 12, attenuated_vertices: 0 },
     }
 }
@@ -191,7 +195,17 @@ fn a_comparison_is_valid_and_wrong_ones_are_refused() {
 #[test]
 fn wrong_records_are_refused() {
     let record = json_of(&record());
-    assert_closed("record", &record, &["", "/reference", "/displacement", "/angles", "/topology"]);
+    let objects = [
+        "/reference",
+        "/displacement",
+        "/angles",
+        "/areas",
+        "/hausdorff",
+        "/validity",
+        "/overlaps",
+        "/topology",
+    ];
+    assert_closed("record", &record, &[&[""], &objects[..]].concat());
     let changes = [
         ("/meshmark_record", json!(2)),
         ("/key_id", json!("434471506306423")),
@@ -209,6 +223,10 @@ fn wrong_records_are_refused() {
         ("/displacement/rms_m", json!(-0.1)),
         ("/displacement/max_m", Value::Null),
         ("/angles/right_angles_kept", json!(1.1)),
+        ("/areas/max_change", json!(-0.1)),
+        ("/hausdorff/p99_m", Value::Null),
+        ("/validity/newly_invalid", json!(0.5)),
+        ("/overlaps/new_area_m2", json!(-1)),
         ("/topology/t_junctions", json!(-1)),
         ("/topology/attenuated_vertices", json!(0.5)),
     ];

@@ -2,6 +2,7 @@
 //! with the original by `meshmark compare`, and prints a Markdown table. It fails when a polygon has become
 //! invalid, or two overlap that did not.
 
+use clap::Parser;
 use meshmark_core::options::{Laplacian, Shape};
 use serde_json::Value;
 use std::{
@@ -13,8 +14,25 @@ use std::{
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
+/// What marking does to the shape and topology of maps.
+#[derive(Parser)]
+struct Arguments {
+    /// Maps
+    #[arg(required = true)]
+    maps: Vec<PathBuf>,
+    /// A further option of the driver, for example AMPLITUDE=0.2; repeatable
+    #[arg(long, value_name = "NAME=VALUE")]
+    option: Vec<String>,
+    /// Output grid, CRS units
+    #[arg(long)]
+    precision: Option<String>,
+    /// Only these shapes
+    #[arg(long, value_delimiter = ',')]
+    shapes: Vec<String>,
+}
+
 fn main() -> ExitCode {
-    match run(&std::env::args_os().skip(1).map(PathBuf::from).collect::<Vec<_>>()) {
+    match run(Arguments::parse()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {
             eprintln!("quality: marking made polygons invalid or overlap");
@@ -28,15 +46,14 @@ fn main() -> ExitCode {
 }
 
 /// Whether every map stayed as good as it was.
-fn run(maps: &[PathBuf]) -> Result<bool> {
-    if maps.is_empty() {
-        return Err("usage: quality MAP...".into());
-    }
-    let work = Work::new()?;
+fn run(Arguments { maps, mut option, precision, shapes }: Arguments) -> Result<bool> {
+    option.extend(precision.iter().map(|precision| format!("PRECISION={precision}")));
+    let work = Work::new(option, precision)?;
+    let is_wanted = |shape: &str| shapes.is_empty() || shapes.iter().any(|wanted| wanted == shape);
     println!("{HEADER}");
     let mut good = true;
-    for map in maps {
-        for shape in Shape::NAMES {
+    for map in &maps {
+        for shape in Shape::NAMES.into_iter().filter(|shape| is_wanted(shape)) {
             for basis in Laplacian::NAMES {
                 let marked = work.mark(map, shape, basis).map_err(|e| format!("{}: {e}", map.display()))?;
                 println!("{}", row(map, shape, basis, &marked));
@@ -49,14 +66,14 @@ fn run(maps: &[PathBuf]) -> Result<bool> {
 }
 
 const HEADER: &str = "\
-| map | shape | basis | vertices | T-junctions | attenuated | invalid, new | overlaps, new | crossings, new and lost | angle change, mean and p99 (°) | right angles kept | RMS (m) |
+| map | shape | basis | vertices | T-junctions | attenuated | invalid, new | overlaps, new, new slivers | crossings, new and lost | angle change, mean and p99 (°) | right angles kept | RMS (m) |
 |---|---|---|---|---|---|---|---|---|---|---|---|";
 
 fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
     let n = |pointer: &str| marked.number(pointer);
     let record = |pointer: &str| marked.record.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
     format!(
-        "| {} | {} | {} | {} | {} | {} | {}, {} | {}, {} | {}, {} | {:.2}, {:.1} | {:.1} % | {:.3} |",
+        "| {} | {} | {} | {} | {} | {} | {}, {} | {}, {}, {} | {}, {} | {:.2}, {:.1} | {:.1} % | {:.3} |",
         map.file_stem().unwrap_or_default().to_string_lossy(),
         shape.to_lowercase(),
         basis.to_lowercase(),
@@ -67,6 +84,7 @@ fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
         n("/validity/newly_invalid"),
         n("/overlaps/before"),
         n("/overlaps/new"),
+        n("/overlaps/new_slivers"),
         n("/crossings/new"),
         n("/crossings/lost"),
         n("/angles/mean_change_deg"),
@@ -93,15 +111,19 @@ struct Work {
     folder: tempfile::TempDir,
     meshmark: PathBuf,
     plugins: PathBuf,
+    options: Vec<String>,
+    precision: Option<String>,
 }
 
 impl Work {
-    fn new() -> Result<Self> {
+    fn new(options: Vec<String>, precision: Option<String>) -> Result<Self> {
         let here = std::env::current_exe()?.parent().ok_or("this program has no folder")?.to_path_buf();
         let work = Work {
             folder: tempfile::tempdir()?,
             meshmark: here.join("meshmark"),
             plugins: here.join("gdalplugins"),
+            options,
+            precision,
         };
         if !work.meshmark.exists() || !work.plugins.exists() {
             return Err("the driver or the command is missing: run `make build` first".into());
@@ -134,9 +156,12 @@ impl Work {
         ] {
             command.arg("-oo").arg(format!("{name}={value}"));
         }
+        command.args(self.options.iter().flat_map(|option| ["-oo", option]));
         succeeded(command.output()?)?;
-        let comparison =
-            succeeded(Command::new(&self.meshmark).args(["compare", "--json"]).args([map, &copy]).output()?)?;
+        let mut command = Command::new(&self.meshmark);
+        command.args(["compare", "--json"]).args([map, &copy]);
+        command.args(self.precision.iter().flat_map(|precision| ["--precision", precision]));
+        let comparison = succeeded(command.output()?)?;
         Ok(Marked {
             comparison: serde_json::from_slice(&comparison)?,
             record: serde_json::from_slice(&fs::read(record)?)?,

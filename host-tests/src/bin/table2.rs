@@ -26,9 +26,9 @@ struct Arguments {
     /// Only the attacks of the paper, only chip rate 2
     #[arg(long)]
     quick: bool,
-    /// Repetition with these chip rates, instead of 2, 3 and LDPC
-    #[arg(long, value_delimiter = ',')]
-    chip_rates: Vec<usize>,
+    /// These codes, instead of 2,3,LDPC: a number is repetition with this chip rate
+    #[arg(long, value_delimiter = ',', value_parser = profile)]
+    profiles: Vec<Profile>,
     /// Only these rows, for example 6,9c,dp0.5
     #[arg(long, value_delimiter = ',')]
     rows: Vec<String>,
@@ -75,10 +75,10 @@ fn run_all(arguments: Arguments) -> Result<()> {
     };
     let plan = Plan {
         maps: geopackages(&arguments.maps)?,
-        profiles: match (quick, arguments.chip_rates.as_slice()) {
+        profiles: match (quick, arguments.profiles.as_slice()) {
             (true, []) => vec![Profile::repetition(2)],
             (false, []) => vec![Profile::repetition(2), Profile::repetition(3), Profile::LDPC],
-            (_, rates) => rates.iter().map(|rate| Profile::repetition(*rate)).collect(),
+            (_, profiles) => profiles.to_vec(),
         },
         wanted: Box::new(wanted),
         seed: arguments.seed,
@@ -101,6 +101,14 @@ fn run_all(arguments: Arguments) -> Result<()> {
     write(&out, &outcomes, plan.seed, &version)?;
     println!("written to {}", out.join("table2.md").display());
     Ok(())
+}
+
+fn profile(text: &str) -> std::result::Result<Profile, String> {
+    match (text, text.parse()) {
+        ("LDPC", _) => Ok(Profile::LDPC),
+        (_, Ok(chip_rate)) => Ok(Profile::repetition(chip_rate)),
+        _ => Err("say LDPC, or a chip rate".into()),
+    }
 }
 
 /// Files as they are given, folders as the GeoPackages in them.

@@ -3,21 +3,24 @@
 //! Features correspond by their order within a layer, vertices by their order within a feature: the driver changes
 //! neither. Lengths, angles and areas are those on the ground.
 
+mod corners;
+mod crossings;
 pub mod detail;
-mod shape;
 mod text;
-mod topology;
 
 use crate::{Error, Result, reading};
 use detail::{Detail, Findings};
 use meshmark_core::{
-    distortion::{AngleChange, Displacement},
+    distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
     ground::Ground,
     vertices::{VertexTable, WIDEST},
 };
-use meshmark_dataset::FeatureGeometry;
+use meshmark_dataset::{
+    FeatureGeometry, Outline,
+    quality::{self, Outlines, Quality, State},
+};
 use serde::Serialize;
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 /// The figures of a comparison. `docs/compare.schema.json` describes them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -55,53 +58,6 @@ pub struct Compared {
     pub torn_vertices: usize,
 }
 
-/// Hausdorff distances of features, metres.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs)]
-pub struct Hausdorff {
-    pub p99_m: f64,
-    pub max_m: f64,
-}
-
-/// Changes of areas, as shares of the area before.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Areas {
-    /// Polygons and multipolygons.
-    pub polygons: usize,
-    /// Mean.
-    pub mean_change: f64,
-    /// 99th percentile.
-    pub p99_change: f64,
-    /// The largest.
-    pub max_change: f64,
-}
-
-/// Geometries that GEOS calls invalid.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Validity {
-    /// In the reference.
-    pub invalid_before: usize,
-    /// In the marked map.
-    pub invalid_after: usize,
-    /// Those that were valid before.
-    pub newly_invalid: usize,
-}
-
-/// Pairs of polygons that overlap by more than a sliver: 1e-6 m², or a cell of the grid if one is given.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Overlaps {
-    /// In the reference.
-    pub before: usize,
-    /// In the marked map.
-    pub after: usize,
-    /// Those that did not before, and have got more than a sliver in common.
-    pub new: usize,
-    /// Their area, m².
-    pub new_area_m2: f64,
-    /// Pairs that did not overlap before and do now, by a sliver.
-    pub new_slivers: usize,
-}
-
 /// Pairs of segments of any features that cross by more than 1e-6 m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Crossings {
@@ -115,6 +71,9 @@ pub struct Crossings {
     pub lost: usize,
 }
 
+/// Further away than marks move anything, numbers of different CRS are of different places.
+const MOST_AWAY_M: f64 = 100.0;
+
 /// Two maps, feature by feature.
 pub(crate) struct Pairs {
     pub features: Vec<Pair>,
@@ -125,8 +84,8 @@ pub(crate) struct Pairs {
 
 /// A geometry before and after.
 pub(crate) struct Pair {
-    pub before: FeatureGeometry,
-    pub after: FeatureGeometry,
+    pub before: Outline,
+    pub after: Outline,
 }
 
 /// Compares two files, and keeps where they differ when `detailed`. `precision` is the grid of the marked one, CRS units: overlaps up to a cell of it are slivers.
@@ -141,8 +100,8 @@ pub fn compare(
     detailed: bool,
 ) -> Result<Comparison> {
     let ground = reading::ground(reference, layers)?;
-    let before = reading::geometries("reference", reference, layers)?;
-    let after = reading::geometries("marked map", marked, layers)?;
+    let (before, own) = reading::geometries("reference", reference, layers)?;
+    let (after, other) = reading::geometries("marked map", marked, layers)?;
     if before.len() != after.len() {
         let (b, a) = (before.len(), after.len());
         return Err(Error::Usage(format!(
@@ -151,11 +110,23 @@ pub fn compare(
         )));
     }
     // The reference was surveyed, the other map was not: it may be as far away as numbers go.
-    let mut values = after.iter().flat_map(|feature| feature.chains.iter().flatten().flatten());
+    let mut values = after.iter().flat_map(|feature| feature.outline.chains.iter().flatten().flatten());
     if let Some(value) = values.find(|value| value.abs() > WIDEST) {
         let marked = marked.display();
         return Err(Error::Unreadable(format!(
             "the marked map {marked} has a coordinate of {value:e}: no map is so wide"
+        )));
+    }
+    let places = before.iter().zip(&after).find_map(|(a, b)| a.outline.first().zip(b.outline.first()));
+    let away_m = places
+        .map_or(0.0, |(from, to)| ground.metres_between(from, to).iter().fold(0.0, |a: f64, b| a.hypot(*b)));
+    if let (Some(own), Some(other), true) = (own, other, away_m > MOST_AWAY_M)
+        && !own.is_same(&other)
+    {
+        let (marked, own, other) = (marked.display(), own.label(), other.label());
+        return Err(Error::Usage(format!(
+            "the marked map {marked} is in {other} and the reference in {own}: compare the copy that was marked, before it \
+             is brought into another CRS"
         )));
     }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
@@ -163,7 +134,7 @@ pub fn compare(
 }
 
 fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
-    let counts = |feature: &FeatureGeometry| feature.chains.iter().map(Vec::len).collect::<Vec<_>>();
+    let counts = |feature: &FeatureGeometry| feature.outline.chains.iter().map(Vec::len).collect::<Vec<_>>();
     if before.layer != after.layer || counts(&before) != counts(&after) {
         let fid = before.fid.map_or("without id".into(), |fid| fid.to_string());
         return Err(Error::Usage(format!(
@@ -172,12 +143,12 @@ fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
             before.layer, after.layer
         )));
     }
-    Ok(Pair { before, after })
+    Ok(Pair { before: before.outline, after: after.outline })
 }
 
 impl Pairs {
     fn compare(&self, detailed: bool) -> Comparison {
-        let all = |map: fn(&Pair) -> &FeatureGeometry| {
+        let all = |map: fn(&Pair) -> &Outline| {
             self.features.iter().flat_map(move |pair| map(pair).chains.iter().flatten().copied())
         };
         let (vertices, indices) =
@@ -192,10 +163,14 @@ impl Pairs {
         let segments = self.segments(&indices);
         let corners = self.corners();
         let angles: Vec<[f64; 2]> = corners.iter().map(|(_, angle)| *angle).collect();
-        let ((validity, invalid), (overlaps, overlapping)) = (self.validity(), self.overlaps());
-        let (crossings, crossing) = topology::crossings(&segments, vertices.coords(), &moved, &self.ground);
+        let Quality { areas, hausdorff, validity, overlaps, newly_invalid, newly_overlapping } =
+            self.quality();
+        let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, &self.ground);
         let detail = detailed.then(|| {
             let torn = vertices.coords().iter().zip(&torn).filter(|(_, torn)| **torn);
+            let place = |number: &u32| self.features[*number as usize].before.first();
+            let invalid = newly_invalid.iter().filter_map(place).collect();
+            let overlapping = newly_overlapping.iter().filter_map(|[_, second]| place(second)).collect();
             Findings {
                 vertices: &vertices,
                 moved: &moved,
@@ -214,9 +189,9 @@ impl Pairs {
                 torn_vertices: torn.into_iter().filter(|torn| *torn).count(),
             },
             displacement: Displacement::between(&vertices, &moved, &self.ground),
-            hausdorff: self.hausdorff(),
+            hausdorff,
             angles: AngleChange::of(&angles),
-            areas: self.areas(),
+            areas,
             validity,
             overlaps,
             crossings,
@@ -239,10 +214,23 @@ impl Pairs {
         segments
     }
 
+    fn quality(&self) -> Quality {
+        let count = self.features.len();
+        let before = |number: usize| Cow::Borrowed(&self.features[number].before);
+        let after = |number: usize| Cow::Borrowed(&self.features[number].after);
+        let (before, after) = (Outlines { count, get: &before }, Outlines { count, get: &after });
+        let [was, is] = [before, after].map(State::of);
+        quality::Comparison {
+            before: (before, &was),
+            after: (after, &is),
+            ground: self.ground,
+            grid: self.grid,
+        }
+        .quality()
+    }
+
     /// Metres per unit at a geometry.
-    fn scale(&self, geometry: &FeatureGeometry) -> [f64; 2] {
-        self.ground.metres_per_unit(
-            geometry.chains.first().and_then(|chain| chain.first()).copied().unwrap_or_default(),
-        )
+    fn scale(&self, geometry: &Outline) -> [f64; 2] {
+        self.ground.metres_per_unit(geometry.first().unwrap_or_default())
     }
 }

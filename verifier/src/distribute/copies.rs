@@ -2,7 +2,6 @@
 
 use crate::{Error, Result};
 use meshmark_core::{
-    embedding::Marked,
     key::SecretKey,
     message::Message,
     options::{Options, Subject},
@@ -69,16 +68,8 @@ impl Copy {
     fn is_record_of_this(&self, options: &Options, key: &SecretKey, reference: &Reference) -> bool {
         let text = fs::read_to_string(&self.record).ok();
         let Some(found) = text.and_then(|text| Record::from_json(&text).ok()) else { return false };
-        let marked = Marked {
-            coords: Vec::new(),
-            patches: found.reference.patches,
-            displacement: found.displacement,
-            angles: found.angles,
-            junctions: found.topology.t_junctions,
-            attenuated: found.topology.attenuated_vertices,
-        };
-        let reference = Reference { patches: marked.patches, ..reference.clone() };
-        let expected = marking::record(options, &self.subject(), key, reference, &marked);
+        let reference = Reference { patches: found.reference.patches, ..reference.clone() };
+        let expected = marking::record(options, &self.subject(), key, reference, found.distortion());
         Record { software: found.software.clone(), ..expected } == found
     }
 

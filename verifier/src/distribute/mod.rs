@@ -2,14 +2,17 @@
 //!
 //! ```text
 //! map ──survey──> vertices ──core::embedding──> displacements of a batch of recipients
-//!  └──ogr2ogr──> staged GeoPackage ──a thread each──> copy ─> moved ─> read back ─> published with its record
+//!  └──ogr2ogr──> staged GeoPackage ──a thread each──> copy ─> moved in place ─> read back ─> published with its record
 //! ```
 //!
 //! A copy that is there is complete; the same command again makes those that are not.
 
 mod copies;
+mod moving;
 mod ogr2ogr;
 mod recipients;
+mod spatial_index;
+mod staged;
 mod writing;
 
 use crate::{Error, Result, progress::Progress, reading};
@@ -22,9 +25,15 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError, Survey, formats::Format, marking, parse_srs, threads, workplace::Workplace,
+    Error as MapError, Survey,
+    formats::Format,
+    marking::{self, Unmarked},
+    parse_srs, threads,
+    workplace::Workplace,
 };
+use staged::Staged;
 use std::{
+    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
     sync::{
@@ -63,17 +72,14 @@ struct Job<'a> {
     key: &'a SecretKey,
     options: &'a Options,
     vertices: &'a VertexTable,
+    unmarked: Unmarked<'a>,
     reference: Reference,
     format: &'static Format,
     /// The GeoPackage with the unmarked map.
-    staged: &'a Path,
+    staged: &'a Staged,
     folder: &'a Path,
-}
-
-impl Job<'_> {
-    fn marks_layer(&self, name: &str) -> bool {
-        self.options.layers.as_ref().is_none_or(|layers| layers.iter().any(|layer| layer == name))
-    }
+    /// What was said while copies were written, each once.
+    warnings: Mutex<BTreeSet<String>>,
 }
 
 /// Writes a marked copy and its record for every recipient who has none yet. `warn` hears of what is legal and
@@ -95,7 +101,7 @@ pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnM
         let mut finished = finished.into_iter();
         copies.retain(|_| !finished.next().expect("one of each"));
         if !copies.is_empty() {
-            let staged = stage(request, format, &map, &workplace, progress)?;
+            let staged = stage(request, format, &map, &workplace, progress, warn)?;
             run(request, &map, (format, &staged), &copies, progress, warn)?;
         }
         Ok(Summary { written: copies.len(), finished_before: all - copies.len() })
@@ -123,15 +129,12 @@ fn stage(
     map: &Survey,
     workplace: &Workplace,
     progress: &mut Progress,
-) -> Result<PathBuf> {
+    warn: &mut dyn FnMut(&str),
+) -> Result<Staged> {
     progress.start("copying", 0);
     let staged = workplace.folder().join("staged.gpkg");
-    ogr2ogr::copy(
-        "GPKG",
-        &request.map,
-        &staged,
-        &["-lco", "SPATIAL_INDEX=NO", "-oo", reading::COLUMNS_OF_CSV],
-    )?;
+    let options = ["-lco", "SPATIAL_INDEX=YES", "-oo", reading::COLUMNS_OF_CSV];
+    ogr2ogr::copy("GPKG", &request.map, &staged, &options)?.iter().for_each(|text| warn(text));
     let (again, layers) = reading::staged(&staged, &request.options)?;
     if again.vertices.digest() != map.vertices.digest() {
         return Err(Error::Unreadable(format!(
@@ -152,14 +155,18 @@ fn stage(
     if let (true, false, Some(layer)) = (format.is_wgs84_only(&[]), is_wgs84, layers.into_iter().next()) {
         return refused(MapError::NotWgs84 { driver, layer });
     }
-    Ok(staged)
+    let marks = |name: &str| {
+        let layers = request.options.layers.as_ref();
+        layers.is_none_or(|layers| layers.iter().any(|layer| layer == name))
+    };
+    Staged::read(staged, &map.vertices, marks)
 }
 
 /// Marks and writes, batch by batch.
 fn run(
     request: &Request,
     survey: &Survey,
-    (format, staged): (&'static Format, &Path),
+    (format, staged): (&'static Format, &Staged),
     copies: &[Copy],
     progress: &mut Progress,
     warn: &mut dyn FnMut(&str),
@@ -173,12 +180,16 @@ fn run(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
     progress.start("patches", 0);
-    let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters))?;
+    let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
     let message = copies[0].message(key);
     let warnings = marking::warnings(parameters, &message, survey, embedding.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
     let reference = marking::reference(survey, embedding.patches());
-    let job = Job { key, options, vertices: &survey.vertices, reference, format, staged, folder };
+    let geometries = survey.geometries.as_ref().expect("the map was read with them");
+    let unmarked = pool.install(|| Unmarked::new(geometries, &map));
+    let vertices = &survey.vertices;
+    let warnings = Mutex::default();
+    let job = Job { key, options, vertices, unmarked, reference, format, staged, folder, warnings };
     let mut written = 0;
     for batch in copies.chunks(embedding.batch()) {
         progress.start("solving patches", embedding.patches() as u64);
@@ -192,7 +203,10 @@ fn run(
             next.map(|((copy, message), wanted)| {
                 let marked = pool.install(|| embedding.settle(&message, &wanted)).map_err(Error::from);
                 drop(wanted);
-                let written = marked.and_then(|marked| writing::write(&job, copy, &marked));
+                let written = marked.and_then(|marked| {
+                    let distortion = pool.install(|| job.unmarked.distortion(&marked, parameters));
+                    writing::write(&job, copy, &marked.coords, distortion)
+                });
                 written.map(|()| step(1)).map_err(|error| error.of(&copy.recipient))
             })
         };
@@ -203,6 +217,7 @@ fn run(
             ))
         })?;
     }
+    job.warnings.into_inner().expect("nobody panics with them").iter().for_each(|text| warn(text));
     Ok(())
 }
 

@@ -7,20 +7,31 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// Copies a dataset to a new one of this format.
-pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<()> {
+/// Copies a dataset to a new one of this format; what `ogr2ogr` warned of.
+pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Vec<String>> {
     let mut command = Command::new("ogr2ogr");
     command.args(["-f", format]).args(options).arg(named(to)).arg(named(from)).stdin(Stdio::null());
     let output = command.output().map_err(|error| {
         Error::Usage(format!("ogr2ogr cannot be run ({error}): install GDAL's programs (package gdal-bin)"))
     })?;
-    if output.status.success() {
-        return Ok(());
-    }
     let text = String::from_utf8_lossy(&output.stderr);
-    let reason = text.lines().find_map(|line| line.strip_prefix("ERROR ")?.split_once(": "));
-    let reason = reason.map_or_else(|| output.status.to_string(), |(_, reason)| reason.into());
+    let said = |kind: &str| -> Vec<String> {
+        let lines = text.lines().filter_map(|line| line.strip_prefix(kind)?.split_once(": "));
+        lines.map(|(_, text)| text.into()).collect()
+    };
+    if output.status.success() {
+        return Ok(said("Warning ")
+            .into_iter()
+            .map(|text| format!("ogr2ogr: {}", nameless(text, to)))
+            .collect());
+    }
+    let reason = said("ERROR ").into_iter().next().unwrap_or_else(|| output.status.to_string());
     Err(Error::Unreadable(format!("{} cannot be copied to {format}: {reason}", from.display())))
+}
+
+/// Without the folder of a file that nobody is to look for.
+fn nameless(text: String, file: &Path) -> String {
+    file.parent().map_or(text.clone(), |folder| text.replace(&format!("{}/", folder.display()), ""))
 }
 
 /// A file name that begins with a dash is no option.

@@ -2,18 +2,26 @@
 
 use crate::{Error, Result};
 use csv::{ReaderBuilder, StringRecord, Trim};
-use std::{collections::BTreeSet, fs, path::Path};
+use std::{collections::BTreeSet, fs::File, io::Read, path::Path};
 
 const HEADER: &str = "recipient";
 
 /// What spreadsheets put between columns.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
 
+/// A list is a few megabytes; a mistaken /dev/zero has no end.
+const LONGEST_LIST: u64 = 64 << 20;
+
 /// Reads the recipients in their order, each once, without blank lines; `warn` hears of those given again.
 pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     let name = path.display();
     let bad = |what: String| Error::Usage(format!("the list of recipients {name} {what}"));
-    let bytes = fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+    let mut bytes = Vec::new();
+    let file = File::open(path).and_then(|file| file.take(LONGEST_LIST + 1).read_to_end(&mut bytes));
+    file.map_err(|error| bad(format!("cannot be read: {error}")))?;
+    if bytes.len() as u64 > LONGEST_LIST {
+        return Err(bad(format!("is longer than {} MiB: split it", LONGEST_LIST >> 20)));
+    }
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes); // the byte order mark of spreadsheets
     let rows = rows(text).map_err(&bad)?;
     let column = match rows.first() {
@@ -100,7 +108,7 @@ mod tests {
     fn parse(text: &[u8]) -> (Vec<String>, String) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("list.csv");
-        fs::write(&path, text).unwrap();
+        std::fs::write(&path, text).unwrap();
         let mut warnings = String::new();
         match read(&path, &mut |text| warnings.push_str(text)) {
             Ok(recipients) => (recipients, warnings),
@@ -132,6 +140,12 @@ mod tests {
         let (recipients, warning) = parse(b"A\n\nB\nA \na\n");
         assert_eq!(recipients, ["A", "B", "a"]);
         assert!(warning.contains("\"A\" is there again in line 4"), "{warning}");
+    }
+
+    #[test]
+    fn a_list_without_an_end_is_refused() {
+        let error = read(Path::new("/dev/zero"), &mut |_| ()).unwrap_err().to_string();
+        assert!(error.contains("/dev/zero is longer than 64 MiB"), "{error}");
     }
 
     #[test]

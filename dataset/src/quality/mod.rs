@@ -1,0 +1,136 @@
+//! What marking does to geometries: areas, Hausdorff distances, validity and overlaps.
+//!
+//! Validity and areas of intersections are GEOS's; what cannot overlap is not asked about. Under an error handler that
+//! shows them, GEOS says what it does not like about invalid geometries.
+
+mod linework;
+mod overlaps;
+
+use crate::Outline;
+use meshmark_core::{
+    distortion::{Areas, Hausdorff, Overlaps, Spread, Validity},
+    ground::Ground,
+};
+use rayon::prelude::*;
+use rstar::{AABB, Envelope};
+use std::{borrow::Cow, collections::BTreeMap};
+
+/// The geometries of a map, numbered; the same numbers before and after.
+#[derive(Clone, Copy)]
+pub struct Outlines<'a> {
+    /// How many.
+    pub count: usize,
+    /// One of them.
+    pub get: &'a (dyn Fn(usize) -> Cow<'a, Outline> + Sync),
+}
+
+/// A map as GEOS sees it.
+pub struct State {
+    /// Of every geometry.
+    sights: Vec<Sight>,
+    /// Pairs of valid polygons, the lower number first, with the area they have in common, where there is one, CRS
+    /// units squared.
+    common: BTreeMap<[u32; 2], f64>,
+}
+
+struct Sight {
+    is_valid: bool,
+    /// CRS units squared; 0 without.
+    area: f64,
+    /// Its bounding box, inside out for an empty one.
+    bounds: AABB<[f64; 2]>,
+}
+
+impl State {
+    /// Looks at all geometries.
+    pub fn of(outlines: Outlines) -> Self {
+        let sights: Vec<Sight> =
+            (0..outlines.count).into_par_iter().map(|number| Sight::of(&(outlines.get)(number))).collect();
+        let common = overlaps::common_areas(outlines, &sights);
+        State { sights, common }
+    }
+}
+
+impl Sight {
+    fn of(outline: &Outline) -> Self {
+        let mut bounds = AABB::new_empty();
+        outline.chains.iter().flatten().for_each(|point| bounds.merge(&AABB::from_point(*point)));
+        match outline.geometry() {
+            Some(geometry) => Sight { is_valid: geometry.is_valid(), area: geometry.area(), bounds },
+            None => Sight { is_valid: false, area: 0.0, bounds },
+        }
+    }
+}
+
+/// What differs between two states of a map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quality {
+    /// Areas of polygons.
+    pub areas: Areas,
+    /// How far features are from where they were, as sets of points.
+    pub hausdorff: Hausdorff,
+    /// By GEOS.
+    pub validity: Validity,
+    /// Polygons that overlap, by GEOS.
+    pub overlaps: Overlaps,
+    /// Geometries that became invalid.
+    pub newly_invalid: Vec<u32>,
+    /// Pairs of polygons that overlap only now.
+    pub newly_overlapping: Vec<[u32; 2]>,
+}
+
+/// A map before and after.
+pub struct Comparison<'a> {
+    /// The geometries before, and what they look like.
+    pub before: (Outlines<'a>, &'a State),
+    /// The geometries after, and what they look like.
+    pub after: (Outlines<'a>, &'a State),
+    /// Metres per unit.
+    pub ground: Ground,
+    /// The grid of the map after, CRS units; 0 without: overlaps up to a cell of it are slivers.
+    pub grid: f64,
+}
+
+impl Comparison<'_> {
+    /// Compares.
+    pub fn quality(&self) -> Quality {
+        let (validity, newly_invalid) = self.validity();
+        let (overlaps, newly_overlapping) = self.overlaps();
+        let (areas, hausdorff) = (self.areas(), self.hausdorff());
+        Quality { areas, hausdorff, validity, overlaps, newly_invalid, newly_overlapping }
+    }
+
+    fn sights(&self) -> impl Iterator<Item = (&Sight, &Sight)> {
+        self.before.1.sights.iter().zip(&self.after.1.sights)
+    }
+
+    fn validity(&self) -> (Validity, Vec<u32>) {
+        let invalid = |state: &State| state.sights.iter().filter(|sight| !sight.is_valid).count();
+        let new = (0..).zip(self.sights()).filter(|(_, (a, b))| a.is_valid && !b.is_valid);
+        let new: Vec<u32> = new.map(|(number, _)| number).collect();
+        let (invalid_before, invalid_after) = (invalid(self.before.1), invalid(self.after.1));
+        (Validity { invalid_before, invalid_after, newly_invalid: new.len() }, new)
+    }
+
+    fn areas(&self) -> Areas {
+        let polygons = self.sights().filter(|(before, _)| before.area > 0.0);
+        let changes: Vec<f64> = polygons.map(|(a, b)| (b.area - a.area).abs() / a.area).collect();
+        let polygons = changes.len();
+        let spread = Spread::of(changes);
+        Areas { polygons, mean_change: spread.mean, p99_change: spread.p99, max_change: spread.max }
+    }
+
+    fn hausdorff(&self) -> Hausdorff {
+        let each = |number: usize| {
+            let (before, after) = ((self.before.0.get)(number), (self.after.0.get)(number));
+            linework::hausdorff(&before, &after, self.scale(&before))
+        };
+        let spread = Spread::of((0..self.before.0.count).into_par_iter().map(each).collect());
+        Hausdorff { p99_m: spread.p99, max_m: spread.max }
+    }
+
+    /// Metres per unit at a geometry.
+    fn scale(&self, outline: &Outline) -> [f64; 2] {
+        self.ground.metres_per_unit(outline.first().unwrap_or_default())
+    }
+}

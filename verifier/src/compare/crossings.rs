@@ -1,0 +1,76 @@
+//! Crossings.
+
+use super::Crossings;
+use meshmark_core::ground::Ground;
+use rayon::prelude::*;
+use robust::{Coord, orient2d};
+use rstar::{
+    AABB, RTree, RTreeObject,
+    primitives::{GeomWithData, Rectangle},
+};
+use std::collections::BTreeSet;
+
+/// Crossings up to this are rounding, metres.
+const GRAZE_M: f64 = 1e-6;
+
+type Segment = GeomWithData<Rectangle<[f64; 2]>, u32>;
+
+/// Counts pairs of segments that cross before and after, and says where one of the two did not or does no longer.
+pub(super) fn crossings(
+    segments: &[[u32; 2]],
+    before: &[[f64; 2]],
+    after: &[[f64; 2]],
+    ground: &Ground,
+) -> (Crossings, Vec<[f64; 2]>) {
+    let (old, new) = (crossing_pairs(segments, before), crossing_pairs(segments, after));
+    let is_deep = |[i, j]: &[u32; 2], coords: &[[f64; 2]]| {
+        let ends = [*i, *j].map(|s| segments[s as usize].map(|v| coords[v as usize]));
+        depth_m(ends, ground) > GRAZE_M
+    };
+    let counts = Crossings {
+        before: old.iter().filter(|pair| is_deep(pair, before)).count(),
+        after: new.iter().filter(|pair| is_deep(pair, after)).count(),
+        new: new.difference(&old).filter(|pair| is_deep(pair, after)).count(),
+        lost: old.difference(&new).filter(|pair| is_deep(pair, before)).count(),
+    };
+    let changed = new.difference(&old).filter(|pair| is_deep(pair, after));
+    let changed = changed.chain(old.difference(&new).filter(|pair| is_deep(pair, before)));
+    let places = changed.map(|[segment, _]| before[segments[*segment as usize][0] as usize]);
+    (counts, places.collect())
+}
+
+fn crossing_pairs(segments: &[[u32; 2]], coords: &[[f64; 2]]) -> BTreeSet<[u32; 2]> {
+    let ends = |segment: u32| segments[segment as usize].map(|v| coords[v as usize]);
+    let leaf = |number: u32| {
+        let [p, q] = ends(number);
+        Segment::new(Rectangle::from_corners(p, q), number)
+    };
+    let leaves: Vec<Segment> = (0..segments.len() as u32).map(leaf).collect();
+    let tree = RTree::bulk_load(leaves.clone());
+    let of_segment = |leaf: &Segment| {
+        let envelope: AABB<[f64; 2]> = leaf.envelope();
+        let later = tree.locate_in_envelope_intersecting(&envelope).filter(|other| other.data > leaf.data);
+        let crossing = later.filter(|other| cross(ends(leaf.data), ends(other.data)));
+        crossing.map(|other| [leaf.data, other.data]).collect::<Vec<_>>()
+    };
+    leaves.par_iter().flat_map_iter(of_segment).collect()
+}
+
+fn side(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
+    let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
+    orient2d(coord(a), coord(b), coord(p))
+}
+
+/// Whether the ends of either are on different sides of the other.
+fn cross([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+/// How far the nearest of the four ends of two crossing segments is from the other segment's line.
+fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], ground: &Ground) -> f64 {
+    let height = |a: [f64; 2], b: [f64; 2], p: [f64; 2]| {
+        let ([ex, ey], [px, py]) = (ground.metres_between(a, b), ground.metres_between(a, p));
+        (ex * py - ey * px).abs() / ex.hypot(ey)
+    };
+    height(a, b, c).min(height(a, b, d)).min(height(c, d, a)).min(height(c, d, b))
+}

@@ -1,0 +1,93 @@
+//! The staged GeoPackage: the unmarked map all copies are made of, and which vertex each of its coordinates is.
+
+use crate::{Error, Result};
+use meshmark_core::vertices::VertexTable;
+use meshmark_dataset::{geopackage, marking::NotMoved};
+use rusqlite::{Connection, OpenFlags};
+use std::{
+    error,
+    path::{Path, PathBuf},
+};
+
+/// What SQLite or a geometry is to blame for.
+pub type Done<T> = std::result::Result<T, Box<dyn error::Error>>;
+
+/// A GeoPackage that `ogr2ogr` made.
+pub struct Staged {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its layers whose geometries move.
+    pub layers: Vec<Layer>,
+}
+
+/// A layer whose geometries move.
+pub struct Layer {
+    /// Its name, which is that of its table.
+    pub name: String,
+    /// The column of its geometries.
+    pub column: String,
+    /// The features that have a geometry, ascending.
+    pub fids: Vec<i64>,
+    /// The vertex of every coordinate, feature by feature.
+    vertices: Vec<u32>,
+}
+
+impl Staged {
+    /// Reads which of the vertices are where, of the layers that are `marked`.
+    pub fn read(path: PathBuf, vertices: &VertexTable, marked: impl Fn(&str) -> bool) -> Result<Self> {
+        let layers = || -> Done<Vec<Layer>> {
+            let connection = open(&path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+            let mut names =
+                connection.prepare("SELECT table_name, column_name FROM gpkg_geometry_columns")?;
+            let names = names.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+            let names: Vec<(String, String)> = names.collect::<rusqlite::Result<_>>()?;
+            let names = names.into_iter().filter(|(name, _)| marked(name));
+            names.map(|(name, column)| Layer::read(&connection, name, column, vertices)).collect()
+        };
+        match layers() {
+            Ok(layers) => Ok(Staged { layers, path }),
+            Err(error) => Err(Error::Unreadable(format!("the map as a GeoPackage cannot be read: {error}"))),
+        }
+    }
+
+    /// The layer of this name, if it moves.
+    pub fn layer(&self, name: &str) -> Option<&Layer> {
+        self.layers.iter().find(|layer| layer.name == name)
+    }
+}
+
+impl Layer {
+    fn read(connection: &Connection, name: String, column: String, table: &VertexTable) -> Done<Self> {
+        let key = "SELECT name FROM pragma_table_info(?1) WHERE pk = 1";
+        let key: String = connection.query_row(key, [&name], |row| row.get(0))?;
+        let [id, geometry, from] =
+            [&key, &column, &name].map(|name| format!("\"{}\"", name.replace('"', "\"\"")));
+        let sql = format!("SELECT {id}, {geometry} FROM {from} WHERE {geometry} NOT NULL ORDER BY {id}");
+        let mut select = connection.prepare(&sql)?;
+        let mut rows = select.query([])?;
+        let (mut fids, mut vertices, mut bytes) = (Vec::new(), Vec::new(), Vec::new());
+        while let Some(row) = rows.next()? {
+            fids.push(row.get(0)?);
+            bytes.clear();
+            bytes.extend_from_slice(row.get_ref(1)?.as_blob()?);
+            geopackage::map_coordinates::<NotMoved>(&mut bytes, &mut |point| {
+                let vertex = table.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
+                vertices.push(vertex as u32);
+                Ok(point)
+            })?;
+        }
+        fids.shrink_to_fit();
+        vertices.shrink_to_fit();
+        Ok(Layer { name, column, fids, vertices })
+    }
+
+    /// Where its coordinates go, feature by feature, when the vertices go `to` these places.
+    pub fn places<'a>(&'a self, to: &'a [[f64; 2]]) -> impl Iterator<Item = [f64; 2]> + 'a {
+        self.vertices.iter().map(|&vertex| to[vertex as usize])
+    }
+}
+
+/// Opens a GeoPackage without GDAL.
+pub fn open(path: &Path, access: OpenFlags) -> rusqlite::Result<Connection> {
+    Connection::open_with_flags(path, access | OpenFlags::SQLITE_OPEN_NO_MUTEX)
+}
