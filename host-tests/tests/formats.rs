@@ -95,14 +95,24 @@ fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
     assert!(layer.contains("osm_id: String") && !layer.contains("WKT: String"), "{layer}");
 
     // A host that opens the file by itself gets them, and hands them on.
-    let run = host.create("out.gpkg", "map.csv", &["-a_srs", "EPSG:3067"]).succeeds();
-    let warnings = run.warnings();
-    let named = |w: &&str| w.contains("attribute \"WKT\"") && w.contains("KEEP_GEOM_COLUMNS=NO");
-    assert_eq!(warnings.iter().filter(|w| named(w)).count(), 1, "{}", run.stderr);
-    let more = ["-dsco", "REFERENCE=b.gpkg", "-dsco", "RECORD=b.json", "-oo", "KEEP_GEOM_COLUMNS=NO"];
-    let run =
-        host.create("b_out.gpkg", "map.csv", &[&more[..], &["-a_srs", "EPSG:3067"]].concat()).succeeds();
-    assert!(run.warnings().is_empty(), "{}", run.stderr);
+    let named = ["-lco", "GEOMETRY=AS_WKT", "-lco", "GEOMETRY_NAME=shape"];
+    let typed = [&named[..], &["-lco", "CREATE_CSVT=YES"]].concat();
+    let open_named = ["-oo", "GEOM_POSSIBLE_NAMES=shape"];
+    for (written, open, attribute) in
+        [(&AS_WKT[..], &[][..], "WKT"), (&named, &open_named, "shape"), (&typed, &[], "shape")]
+    {
+        let host = Host::new();
+        let csv = [&["-f", "CSV", "map.csv", &from, "buildings"][..], written].concat();
+        host.run("ogr2ogr", &csv).succeeds();
+        let open = [&["-a_srs", "EPSG:3067"][..], open].concat();
+        let run = host.create("out.gpkg", "map.csv", &open).succeeds();
+        let (warnings, expected) = (run.warnings(), format!("attribute \"{attribute}\""));
+        let says = |w: &&str| w.contains(&expected) && w.contains("KEEP_GEOM_COLUMNS=NO");
+        assert_eq!(warnings.iter().filter(|w| says(w)).count(), 1, "{written:?}: {}", run.stderr);
+        let more = ["-dsco", "REFERENCE=b.gpkg", "-dsco", "RECORD=b.json", "-oo", "KEEP_GEOM_COLUMNS=NO"];
+        let run = host.create("b_out.gpkg", "map.csv", &[&more[..], &open].concat()).succeeds();
+        assert!(run.warnings().is_empty(), "{written:?}: {}", run.stderr);
+    }
 }
 
 // --- writing ---------------------------------------------------------------------------------------
