@@ -134,11 +134,13 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
 fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
     let fields: Vec<_> = layer.defn().fields().map(|field| (field.name(), field.field_type())).collect();
     let is_wkt = |text: String| Geometry::from_wkt(&text).is_ok();
-    layer.features().take(FEATURES_TO_LOOK_AT).find_map(|feature| {
+    let found = layer.features().take(FEATURES_TO_LOOK_AT).find_map(|feature| {
         let mut texts = fields.iter().enumerate().filter(|(_, (_, kind))| *kind == OGRFieldType::OFTString);
         let holds_wkt = |index| feature.field_as_string(index).is_ok_and(|text| text.is_some_and(is_wkt));
         texts.find(|(index, _)| holds_wkt(*index)).map(|(_, (name, _))| name.clone())
-    })
+    });
+    layer.reset_feature_reading();
+    found
 }
 
 /// What the record says about the map.

@@ -206,13 +206,13 @@ pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Markin
     }
     let collector = Collector::new();
     let files = source.watch_files();
-    let as_text = coordinates_as_text(source); // while attributes are read
-    let _geometry_only = source.read_geometry_only();
+    let geometry_only = source.read_geometry_only();
     collector.clear();
     let last_failure = || collector.first_failure();
-    let source = Source { name, dataset: source, files, last_failure: &last_failure };
-    let mut marking = Marking::new(request, source, threads())?;
-    marking.warnings.extend(as_text);
+    let surveyed = Source { name, dataset: source, files, last_failure: &last_failure };
+    let mut marking = Marking::new(request, surveyed, threads())?;
+    drop(geometry_only);
+    marking.warnings.extend(coordinates_as_text(source)); // the survey is to meet what cannot be read
     Ok(marking)
 }
 
