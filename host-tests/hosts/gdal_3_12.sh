@@ -30,7 +30,7 @@ fi
 [[ $(with_3_12 ogr2ogr --version) == "GDAL 3.12."* ]] || fail "$gdal is not GDAL 3.12"
 with_3_12 make -s -C "$root" build BUILD="$folder/target/release"
 with_3_12 ldd "$folder/target/release/meshmark" | grep -q "$gdal/lib/libgdal" || fail "the command is not linked with GDAL 3.12"
-(cd "$root" && with_3_12 "${CARGO:-cargo}" test --release --locked "${crates[@]}") >"$work/tests" 2>&1 ||
+(cd "$root" && with_3_12 "${CARGO:-cargo}" test --release --locked --no-fail-fast "${crates[@]}") >"$work/tests" 2>&1 ||
     fail "$(grep -vE '^test .* ok$' "$work/tests")"
 passed "$(awk '/^test result: ok/ { n += $4 } END { print n }' "$work/tests") tests with $(with_3_12 ogr2ogr --version)"
 with_3_12 "$root/host-tests/conformance/run.sh" with "$gdal/bin/test_ogrsf"
