@@ -68,8 +68,8 @@ faults: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the examples, a clean Debian; installs
-# what they need.
+# A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the wheel's GDAL and one that is
+# compiled, which takes half an hour the first time, the examples, a clean Debian; installs what they need.
 hosts: build plugin-for-wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
@@ -77,6 +77,7 @@ hosts: build plugin-for-wheel
 	host-tests/hosts/qgis_plugin.sh
 	host-tests/hosts/chromium.sh
 	host-tests/hosts/wheel.sh
+	host-tests/hosts/gdal_3_12.sh
 	host-tests/hosts/examples.sh
 	host-tests/hosts/deb.sh
 

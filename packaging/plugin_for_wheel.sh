@@ -3,10 +3,8 @@
 # Usage: plugin_for_wheel.sh PYTHON OUTPUT_FOLDER: a Python that can import pyogrio, and where ogr_MESHMARK.so goes.
 set -euo pipefail
 
-# GDAL's headers, which no wheel has: the sources of GDAL in a crate. Its C++ interface is that of all of 3.12.
+# GDAL's headers, which no wheel has, are those of gdal_source.sh: its C++ interface is that of all of 3.12.
 readonly headers_of=3.12
-readonly crate=gdal-src-0.3.0+3.12.1
-readonly crate_sha256=529210c62af5a747e8b268d4a527c8dd54f45a07db0682acfcc9313e869c54d3
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 python=$1
@@ -33,10 +31,8 @@ home=$output/gdal-$version
 if [ ! -f "$home/include/gdal_version.h" ]; then
     work=$(mktemp -d)
     trap 'rm -rf "$work"' EXIT
-    curl -fsSL "https://static.crates.io/crates/gdal-src/$crate.crate" -o "$work/crate"
-    echo "$crate_sha256  $work/crate" | sha256sum --check --quiet
-    tar -xzf "$work/crate" -C "$work"
-    source=$work/$crate/source
+    source=$work/source
+    "$root/packaging/gdal_source.sh" "$source"
     mkdir -p "$home/include" "$home/lib"
     cp "$source"/{port,gcore,ogr,alg,apps}/*.h "$source"/ogr/ogrsf_frmts/*.h "$home/include/"
     # What configuring GDAL would make: types of this machine, as the system's GDAL has them, and the version.

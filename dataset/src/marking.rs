@@ -5,7 +5,10 @@ use crate::{
     quality::{Comparison, Outlines, Quality, State},
     wkb,
 };
-use gdal::{Dataset, vector::LayerAccess};
+use gdal::{
+    Dataset,
+    vector::{Geometry, Layer, LayerAccess, OGRFieldType},
+};
 use meshmark_core::{
     embedding::Marked,
     ground::Ground,
@@ -61,6 +64,9 @@ pub enum NotMoved {
 /// Smaller than so many tolerances a map would be noise after its marking.
 const LEAST_TOLERANCES: f64 = 10.0;
 
+/// Where coordinates as text are looked for: some of a layer's features may have none.
+const FEATURES_TO_LOOK_AT: usize = 100;
+
 /// Fails for a map so small that its units cannot be meant.
 ///
 /// # Errors
@@ -115,14 +121,26 @@ pub fn warnings(
 
 /// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
 pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
-    let mut layers = dataset.layers();
-    let layer =
-        layers.find(|layer| layer.defn().fields().any(|field| field.name().eq_ignore_ascii_case("WKT")))?;
+    let find = |mut layer: Layer| Some((layer.name(), attribute_of_wkt(&mut layer)?));
+    let (layer, attribute) = dataset.layers().find_map(find)?;
     Some(format!(
-        "layer \"{}\" has an attribute \"WKT\", which stays as it is: if it holds the coordinates, anybody can undo the \
-         mark; leave it out, for example with -select, or open a CSV file with KEEP_GEOM_COLUMNS=NO",
-        layer.name()
+        "layer \"{layer}\" has coordinates as text in its attribute \"{attribute}\", which stays as it is: with it \
+         anybody can undo the mark; leave it out, for example with -select, or open a CSV file with \
+         KEEP_GEOM_COLUMNS=NO"
     ))
+}
+
+/// The first attribute that holds a geometry as text in one of the first features, whatever its name.
+fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
+    let fields: Vec<_> = layer.defn().fields().map(|field| (field.name(), field.field_type())).collect();
+    let is_wkt = |text: String| Geometry::from_wkt(&text).is_ok();
+    let found = layer.features().take(FEATURES_TO_LOOK_AT).find_map(|feature| {
+        let mut texts = fields.iter().enumerate().filter(|(_, (_, kind))| *kind == OGRFieldType::OFTString);
+        let holds_wkt = |index| feature.field_as_string(index).is_ok_and(|text| text.is_some_and(is_wkt));
+        texts.find(|(index, _)| holds_wkt(*index)).map(|(_, (name, _))| name.clone())
+    });
+    layer.reset_feature_reading();
+    found
 }
 
 /// What the record says about the map.

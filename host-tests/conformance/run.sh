@@ -4,6 +4,7 @@
 #   run.sh         build test_ogrsf if need be, then run it; needs the plugin and the command line
 #                  tool, both built in release mode
 #   run.sh build   only build test_ogrsf
+#   run.sh with P  run P, the test_ogrsf of another GDAL, whose ogr2ogr comes first in PATH
 #
 # Debian packages no test_ogrsf: it is compiled here, once, from the source package of the very
 # libgdal-dev that is installed. All files go to target/conformance; apt's configuration, lists and
@@ -105,18 +106,20 @@ check() {
     local log=$work/$1.log status=0
     "$test_ogrsf" -ro "${@:2}" >"$log" 2>&1 || status=$?
     grep '^WARNING' "$log" || true
-    if ((status != 0)) || grep -qE 'ERROR|FAILURE' "$log" || ! grep -q 'Testing layer' "$log"; then
-        cat "$log" >&2
-        fail "test_ogrsf fails on $1 (exit status $status; the output above is in $log)"
-    fi
-    echo "passed: $1, $(grep -c 'Testing layer' "$log") layer(s)"
+    ((status == 0)) && ! grep -qE 'ERROR|FAILURE' "$log" && grep -q 'Testing layer' "$log"
 }
 
-# check_pair NAME MAP: the map as it is first, so that a failure through MESHMARK is MESHMARK's.
-check_pair() {
-    check "$1-native" "$2"
-    GDAL_DRIVER_PATH=$plugins check "$1-meshmark" "MESHMARK:$2" \
-        -oo KEY="$scratch/key.json" -oo RECIPIENT="conformance test"
+# check_map NAME MAP: through MESHMARK. Only when that fails does it matter whether the map's own driver does too: that of
+# GeoPackage in GDAL 3.12.1 does, over a count with two filters.
+check_map() {
+    if GDAL_DRIVER_PATH=$plugins check "$1-meshmark" "MESHMARK:$2" \
+        -oo KEY="$scratch/key.json" -oo RECIPIENT="conformance test"; then
+        echo "passed: $1, $(grep -c 'Testing layer' "$work/$1-meshmark.log") layer(s)"
+        return
+    fi
+    cat "$work/$1-meshmark.log" >&2
+    check "$1-native" "$2" || echo "conformance: without MESHMARK, $1 fails too: $work/$1-native.log" >&2
+    fail "test_ogrsf fails on $1 (the output above is in $work/$1-meshmark.log)"
 }
 
 make_shapefile() {
@@ -133,9 +136,14 @@ run() {
     trap 'rm -rf "$scratch"' EXIT
     "$target/release/meshmark" keygen "$scratch/key.json"
     make_shapefile "$scratch/buildings.shp"
-    check_pair geopackage "$fixture"
-    check_pair shapefile "$scratch/buildings.shp"
+    check_map geopackage "$fixture"
+    check_map shapefile "$scratch/buildings.shp"
 }
 
-build
+if [[ ${1:-} == with ]]; then
+    test_ogrsf=$2
+    mkdir -p "$work"
+else
+    build
+fi
 [[ ${1:-} == build ]] || run

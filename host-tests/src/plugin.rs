@@ -212,9 +212,11 @@ impl Run {
         self
     }
 
-    /// The failures of GDAL among its messages.
+    /// The failures of GDAL among its messages, but for the one that `ogr2ogr` ends with when a source does not open: in
+    /// GDAL 3.12 it is an `ERROR`, in 3.6 a `FAILURE`.
     pub fn errors(&self) -> Vec<&str> {
-        self.stderr.lines().filter(|line| line.starts_with("ERROR ")).collect()
+        let is_last_word = |line: &&str| line.starts_with("ERROR 1: Unable to open datasource `");
+        self.stderr.lines().filter(|line| line.starts_with("ERROR ") && !is_last_word(line)).collect()
     }
 
     /// The warnings of GDAL among its messages.

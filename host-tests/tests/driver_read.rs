@@ -350,8 +350,11 @@ fn a_spatial_filter_reads_what_it_reads_of_the_marked_map() {
         for (number, rectangle) in boxes(name).iter().enumerate() {
             let spat = [&["-spat"], &rectangle[..]].concat();
             let (view, file) = (format!("view{number}_{name}"), format!("file{number}_{name}"));
-            host.mark("GPKG", &view, &source(name), &spat).succeeds();
-            host.run("ogr2ogr", &[&["-f", "GPKG", &file, &marked], &spat[..]].concat()).succeeds();
+            let of_view = host.mark("GPKG", &view, &source(name), &spat);
+            let of_file = host.run("ogr2ogr", &[&["-f", "GPKG", &file, &marked], &spat[..]].concat());
+            assert_eq!((of_view.code, of_file.code), (Some(0), Some(0)), "{}", of_view.stderr);
+            // GDAL 3.12 has one about a table without geometry.
+            assert_eq!(of_view.errors(), of_file.errors());
             let (view, file) = (contents::read(&host.path(&view)), contents::read(&host.path(&file)));
             assert!(view.iter().any(|layer| !layer.features.is_empty()), "{name}: the test finds something");
             assert!(by_fid(view) == by_fid(file), "{name}, {rectangle:?}");
@@ -391,7 +394,9 @@ fn attribute_filters_work_and_those_on_geometry_see_the_marked_one() {
     assert_eq!(exact(&wkt(unmarked.features[7].geometries[0].as_ref().unwrap())), 0);
     let native =
         ogrinfo(&host, &source("helsinki.gpkg"), &["-so", "amenities", "-where", "ST_MinX(geom) > 0"]);
-    assert_ne!(native.code, Some(0), "SQL of the source's own on its unmarked geometry is refused");
+    // The exit code of ogrinfo is 0 all the same in GDAL 3.12.
+    let refused = native.stderr.contains("asks for geometry") && !native.stdout.contains("Feature Count");
+    assert!(refused, "SQL of the source's own on its unmarked geometry is refused: {}", native.stderr);
 }
 
 #[test]

@@ -129,7 +129,7 @@ fn a_feature_that_fails_is_never_skipped() {
     let host = Host::new();
     // Two layers into one, with the same ids: every feature of the second fails.
     let more = ["buildings", "landuse", "-nln", "both", "-nlt", "GEOMETRY", "-preserve_fid"];
-    for option in [&["-skipfailures"][..], &["-gt", "1"], &["-gt", "7", "-skipfailures"]] {
+    for option in [&["-skipfailures"][..], &["-gt", "1"], &["-gt", "7"]] {
         let more = [&more[..], option].concat();
         fails(&host, "out.gpkg", &source("kotka.gpkg"), &more, &["UNIQUE constraint"]);
     }
@@ -138,14 +138,26 @@ fn a_feature_that_fails_is_never_skipped() {
 #[test]
 fn transactions_of_any_size_make_the_same_map() {
     let host = Host::new();
-    let mut seen = Vec::new();
-    fails(&host, "out.gpkg", &source("kotka.gpkg"), &["-gt", "0"], &["MESHMARK:out.gpkg"]); // as with any database
-    for size in ["1", "100", "unlimited"] {
-        host.create("out.gpkg", &source("kotka.gpkg"), &["-gt", size]).succeeds();
-        seen.push(meshmark_host_tests::contents::read(&host.path("out.gpkg")));
+    let take = |host: &Host| {
+        let map = meshmark_host_tests::contents::read(&host.path("out.gpkg"));
         for name in ["out.gpkg", "ref.gpkg", "record.json"] {
             fs::remove_file(host.path(name)).unwrap();
         }
+        map
+    };
+    let mut seen = Vec::new();
+    // Without transactions ogr2ogr of GDAL 3.6 commits all the same, which fails as with any database.
+    let before = host.files();
+    let without = host.create("out.gpkg", &source("kotka.gpkg"), &["-gt", "0"]);
+    if without.code == Some(0) {
+        seen.push(take(&host));
+    } else {
+        assert!(without.stderr.contains("MESHMARK:out.gpkg"), "{}", without.stderr);
+        assert!(host.files() == before, "{:?}", host.names());
+    }
+    for size in ["1", "100", "unlimited"] {
+        host.create("out.gpkg", &source("kotka.gpkg"), &["-gt", size]).succeeds();
+        seen.push(take(&host));
     }
     assert!(seen.windows(2).all(|pair| pair[0] == pair[1]));
 }

@@ -32,6 +32,9 @@ const PLAIN: Read = Read { format: "", ending: "", source: &LAYER, options: &[],
 /// These formats do not say which CRS they are in.
 const CRS: [&str; 2] = ["-oo", "SRS=EPSG:3067"];
 
+/// From GDAL 3.11 on the column is named after the source's, and only one named `WKT` is read again.
+const AS_WKT: [&str; 4] = ["-lco", "GEOMETRY=AS_WKT", "-lco", "GEOMETRY_NAME=WKT"];
+
 const READ: &[Read] = &[
     Read { format: "GPKG", ending: ".gpkg", ..PLAIN },
     Read { format: "ESRI Shapefile", ending: "", source: &[], ..PLAIN }, // all layers, in a folder
@@ -49,7 +52,7 @@ const READ: &[Read] = &[
     Read { format: "MapInfo File", ending: ".tab", ..PLAIN },
     Read { format: "MapInfo File", ending: ".mif", open: &CRS, ..PLAIN },
     Read { format: "DXF", ending: ".dxf", source: &BARE, open: &CRS, ..PLAIN },
-    Read { format: "CSV", ending: ".csv", options: &["-lco", "GEOMETRY=AS_WKT"], open: &CRS, ..PLAIN },
+    Read { format: "CSV", ending: ".csv", options: &AS_WKT, open: &CRS, ..PLAIN },
     Read { format: "SQLite", ending: ".sqlite", ..PLAIN },
     Read { format: "SQLite", ending: "-spatialite.sqlite", options: &["-dsco", "SPATIALITE=YES"], ..PLAIN },
 ];
@@ -84,21 +87,34 @@ fn a_zipped_shapefile_is_read_where_it_is() {
 #[test]
 fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
     let host = Host::new();
-    let make = ["-f", "CSV", "map.csv", &kotka(), "buildings", "-lco", "GEOMETRY=AS_WKT"];
+    let from = kotka();
+    let make = [&["-f", "CSV", "map.csv", &from, "buildings"][..], &AS_WKT].concat();
     host.run("ogr2ogr", &make).succeeds();
     host.mark("GPKG", "marked.gpkg", "map.csv", &CRS).succeeds();
     let layer = host.run("ogrinfo", &["-so", "marked.gpkg", "map"]).succeeds().stdout;
     assert!(layer.contains("osm_id: String") && !layer.contains("WKT: String"), "{layer}");
 
     // A host that opens the file by itself gets them, and hands them on.
-    let run = host.create("out.gpkg", "map.csv", &["-a_srs", "EPSG:3067"]).succeeds();
-    let warnings = run.warnings();
-    let named = |w: &&str| w.contains("attribute \"WKT\"") && w.contains("KEEP_GEOM_COLUMNS=NO");
-    assert_eq!(warnings.iter().filter(|w| named(w)).count(), 1, "{}", run.stderr);
-    let more = ["-dsco", "REFERENCE=b.gpkg", "-dsco", "RECORD=b.json", "-oo", "KEEP_GEOM_COLUMNS=NO"];
-    let run =
-        host.create("b_out.gpkg", "map.csv", &[&more[..], &["-a_srs", "EPSG:3067"]].concat()).succeeds();
-    assert!(run.warnings().is_empty(), "{}", run.stderr);
+    let (plain, typed) = (&AS_WKT[..], &[&AS_WKT[..], &["-lco", "CREATE_CSVT=YES"][..]].concat());
+    for (attribute, written, open) in [
+        ("WKT", plain, &[][..]),
+        ("shape", plain, &["-oo", "GEOM_POSSIBLE_NAMES=shape"][..]),
+        ("shape", &typed[..], &[][..]),
+    ] {
+        let host = Host::new();
+        let csv = [&["-f", "CSV", "map.csv", &from, "buildings"][..], written].concat();
+        host.run("ogr2ogr", &csv).succeeds();
+        let text = fs::read_to_string(host.path("map.csv")).unwrap();
+        fs::write(host.path("map.csv"), text.replacen("WKT", attribute, 1)).unwrap();
+        let open = [&["-a_srs", "EPSG:3067"][..], open].concat();
+        let run = host.create("out.gpkg", "map.csv", &open).succeeds();
+        let (warnings, expected) = (run.warnings(), format!("attribute \"{attribute}\""));
+        let says = |w: &&str| w.contains(&expected) && w.contains("KEEP_GEOM_COLUMNS=NO");
+        assert_eq!(warnings.iter().filter(|w| says(w)).count(), 1, "{written:?}: {}", run.stderr);
+        let more = ["-dsco", "REFERENCE=b.gpkg", "-dsco", "RECORD=b.json", "-oo", "KEEP_GEOM_COLUMNS=NO"];
+        let run = host.create("b_out.gpkg", "map.csv", &[&more[..], &open].concat()).succeeds();
+        assert!(run.warnings().is_empty(), "{written:?}: {}", run.stderr);
+    }
 }
 
 // --- writing ---------------------------------------------------------------------------------------

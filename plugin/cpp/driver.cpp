@@ -14,13 +14,23 @@ static void ReportException(const char *reason)
     CPLError(CE_Failure, CPLE_AppDefined, "MESHMARK failed inside: %s", reason);
 }
 
+// GDALIdentifyDriver gives no flags, or those of every kind of data (GDAL 3.12); opening gives others.
+static bool IsAskedForTheDriver(const GDALOpenInfo *info)
+{
+    return info->nOpenFlags == 0 || info->nOpenFlags == (GDAL_OF_KIND_MASK & ~GDAL_OF_MULTIDIM_RASTER);
+}
+
 // GDAL's writers delete a file of the output's name before they make their own, by the driver that
 // identifies it. While a map is being read through MESHMARK, that driver is this one, and Delete
-// below refuses. Only GDALIdentifyDriver gives no flags; opening always does.
+// below refuses. So does Open for an update, which GDAL 3.12 asks only of drivers that may know the file.
 static int Identify(GDALOpenInfo *info)
 {
-    return HasPrefix(info->pszFilename) ||
-           (info->nOpenFlags == 0 && meshmark_is_being_read(info->pszFilename));
+    if (HasPrefix(info->pszFilename))
+        return TRUE;
+    const bool updates = info->eAccess == GA_Update;
+    if ((!updates && !IsAskedForTheDriver(info)) || !meshmark_is_being_read(info->pszFilename))
+        return FALSE;
+    return updates ? GDAL_IDENTIFY_UNKNOWN : TRUE;
 }
 
 static GDALDataset *Open(GDALOpenInfo *info)

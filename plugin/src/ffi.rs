@@ -10,7 +10,10 @@ use crate::{
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
-use meshmark_dataset::{marking::NotMoved, threads};
+use meshmark_dataset::{
+    marking::{NotMoved, coordinates_as_text},
+    threads,
+};
 use std::{
     ffi::{CString, c_char},
     path::Path,
@@ -203,10 +206,14 @@ pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Markin
     }
     let collector = Collector::new();
     let files = source.watch_files();
-    let _geometry_only = source.read_geometry_only();
+    let geometry_only = source.read_geometry_only();
     collector.clear();
     let last_failure = || collector.first_failure();
-    Marking::new(request, Source { name, dataset: source, files, last_failure: &last_failure }, threads())
+    let surveyed = Source { name, dataset: source, files, last_failure: &last_failure };
+    let mut marking = Marking::new(request, surveyed, threads())?;
+    drop(geometry_only);
+    marking.warnings.extend(coordinates_as_text(source)); // the survey is to meet what cannot be read
+    Ok(marking)
 }
 
 /// Gives a marking to the shim, or says why there is none.

@@ -142,8 +142,7 @@ impl Marking {
         });
         map.geometries = None;
         let spelling = Spelling::OpenOption;
-        let mut warnings = marking::warnings(&options.parameters, &message, &map, marked.patches, spelling);
-        warnings.extend(marking::coordinates_as_text(source.dataset));
+        let warnings = marking::warnings(&options.parameters, &message, &map, marked.patches, spelling);
         Ok(Marking {
             name: source.name,
             map,

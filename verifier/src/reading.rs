@@ -123,8 +123,10 @@ pub(crate) fn source(path: &Path, options: &Options, warn: &mut dyn FnMut(&str))
         )));
     }
     let dataset = open("map", path, None)?;
+    let survey =
+        read("map", path, &dataset, &Reading { geometries: true, ..reading_of(options) }, Target::Own)?;
     marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
-    read("map", path, &dataset, &Reading { geometries: true, ..reading_of(options) }, Target::Own)
+    Ok(survey)
 }
 
 /// Reads the vertices and the names of all layers of a copy of such a map.

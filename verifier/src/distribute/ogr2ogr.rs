@@ -17,6 +17,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
         .arg(named(to))
         .arg(named(from))
         .stdin(Stdio::null());
+    command.env("OGR2OGR_USE_ARROW_API", "NO"); // which rounds what a column FLOAT holds to 32 bits
     let output = command.output().map_err(|error| {
         Error::Usage(format!("ogr2ogr cannot be run ({error}): install GDAL's programs (package gdal-bin)"))
     })?;
