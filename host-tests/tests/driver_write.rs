@@ -42,6 +42,35 @@ fn marking_while_writing_and_marking_while_reading_make_the_same_map() {
 }
 
 #[test]
+fn what_a_geojson_file_said_of_its_unmarked_extent_is_in_no_copy() {
+    let host = Host::new();
+    let layer = [source("kotka.gpkg"), "buildings".into()];
+    let bounds = ["-f", "GeoJSON", "map.geojson", "-lco", "WRITE_BBOX=YES", &layer[0], &layer[1]];
+    host.run("ogr2ogr", &bounds).succeeds();
+    host.run("ogr2ogr", &["map.gpkg", "map.geojson"]).succeeds();
+    fs::write(host.path("list.csv"), "recipient\nACME GmbH\n").unwrap();
+    let says_it = |map: &str| {
+        let said = host.run("ogrinfo", &["-so", "-mdd", "all", map, "buildings"]).succeeds().stdout;
+        said.contains("NATIVE_DATA")
+    };
+    assert!(says_it("map.gpkg"), "ogr2ogr keeps it");
+
+    host.mark("GPKG", "read.gpkg", "map.gpkg", &[]).succeeds();
+    host.create("written.gpkg", "map.geojson", &[]).succeeds();
+    let list =
+        ["distribute", "--key", "key.json", "--recipients", "list.csv", "--output-dir", "out", "map.gpkg"];
+    host.run(host.meshmark().to_str().unwrap(), &list).succeeds();
+    let copies = fs::read_dir(host.path("out")).unwrap().map(|entry| entry.unwrap().path());
+    let distributed = copies.filter(|path| path.extension().is_some_and(|kind| kind == "gpkg"));
+    let mut marked: Vec<_> = distributed.map(|path| path.to_str().unwrap().to_string()).collect();
+    assert_eq!(marked.len(), 1);
+    marked.extend(["read.gpkg".into(), "written.gpkg".into()]);
+    for map in marked {
+        assert!(!says_it(&map), "{map}");
+    }
+}
+
+#[test]
 fn every_format_gets_what_its_own_driver_writes_but_for_the_coordinates() {
     for (format, target, native) in [
         ("GPKG", "out.gpkg", "native.gpkg"),

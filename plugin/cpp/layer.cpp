@@ -7,6 +7,8 @@
 
 // Between two looks at the source's files, so that a change is seen before a writer commits.
 constexpr int FEATURES_BETWEEN_CHECKS = 256;
+// The metadata domain in which GDAL keeps members of a GeoJSON file, "bbox" among them.
+constexpr const char *NATIVE_DATA = "NATIVE_DATA";
 
 MeshmarkLayer::MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, const MeshmarkMarking *marking)
     : m_dataset(dataset), m_source(source), m_marking(marking),
@@ -18,6 +20,30 @@ MeshmarkLayer::MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, const M
 GDALDataset *MeshmarkLayer::GetDataset()
 {
     return &m_dataset;
+}
+
+// --- metadata: the source's, but for what a GeoJSON file said of its unmarked extent -----------------
+
+static bool IsNativeData(const char *domain)
+{
+    return domain && EQUAL(domain, NATIVE_DATA);
+}
+
+char **MeshmarkLayer::GetMetadata(const char *domain)
+{
+    return IsNativeData(domain) ? nullptr : m_source.GetMetadata(domain);
+}
+
+char **MeshmarkLayer::GetMetadataDomainList()
+{
+    char **domains = m_source.GetMetadataDomainList();
+    const int native = CSLFindString(domains, NATIVE_DATA);
+    return native < 0 ? domains : CSLRemoveStrings(domains, native, 1, nullptr);
+}
+
+const char *MeshmarkLayer::GetMetadataItem(const char *name, const char *domain)
+{
+    return IsNativeData(domain) ? nullptr : m_source.GetMetadataItem(name, domain);
 }
 
 // --- reading -------------------------------------------------------------------------------------

@@ -121,6 +121,10 @@ class MeshmarkLayer final : public OGRLayer
     OGRErr GetExtent(int field, OGREnvelope *extent, int force) override;
 #endif
 
+    char **GetMetadata(const char *domain) override;
+    char **GetMetadataDomainList() override;
+    const char *GetMetadataItem(const char *name, const char *domain) override;
+
     // Handed on as they are.
     const char *GetName() MESHMARK_CONST override { return m_source.GetName(); }
     OGRwkbGeometryType GetGeomType() MESHMARK_CONST override { return m_source.GetGeomType(); }
@@ -130,12 +134,6 @@ class MeshmarkLayer final : public OGRLayer
     const char *GetGeometryColumn() MESHMARK_CONST override { return m_source.GetGeometryColumn(); }
     int FindFieldIndex(const char *name, int exact) override { return m_source.FindFieldIndex(name, exact); }
     OGRStyleTable *GetStyleTable() override { return m_source.GetStyleTable(); }
-    char **GetMetadata(const char *domain) override { return m_source.GetMetadata(domain); }
-    char **GetMetadataDomainList() override { return m_source.GetMetadataDomainList(); }
-    const char *GetMetadataItem(const char *name, const char *domain) override
-    {
-        return m_source.GetMetadataItem(name, domain);
-    }
     GDALDataset *GetDataset() override;
 
   private:

@@ -423,14 +423,16 @@ impl Drop for Output {
     }
 }
 
+/// But for what a GeoJSON file said of itself, its unmarked extent too.
+///
 /// # Safety
 /// Both are datasets or layers that are open.
 unsafe fn copy_metadata(from: *mut std::ffi::c_void, to: *mut std::ffi::c_void) {
     // SAFETY: the list of names is ours to free, those of a domain are copied.
     unsafe {
         let domains = gdal_sys::GDALGetMetadataDomainList(from);
-        for domain in strings(domains.cast()) {
-            let domain = c_string(&domain);
+        for domain in strings(domains.cast()).iter().filter(|domain| *domain != "NATIVE_DATA") {
+            let domain = c_string(domain);
             let items = gdal_sys::GDALGetMetadata(from, domain.as_ptr());
             if !items.is_null() && !(*items).is_null() {
                 gdal_sys::GDALSetMetadata(to, items.cast(), domain.as_ptr());

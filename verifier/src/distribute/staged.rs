@@ -44,7 +44,7 @@ impl Staged {
             let names = names.into_iter().filter(|(name, _)| marked(name));
             names.map(|(name, column)| Layer::read(&connection, name, column, vertices)).collect()
         };
-        match layers() {
+        match forget_native_data(&path).and_then(|()| layers()) {
             Ok(layers) => Ok(Staged { layers, path }),
             Err(error) => Err(Error::Unreadable(format!("the map as a GeoPackage cannot be read: {error}"))),
         }
@@ -85,6 +85,26 @@ impl Layer {
     pub fn places<'a>(&'a self, to: &'a [[f64; 2]]) -> impl Iterator<Item = [f64; 2]> + 'a {
         self.vertices.iter().map(|&vertex| to[vertex as usize])
     }
+}
+
+/// What a GeoJSON file said of itself came with the map, its unmarked extent too.
+fn forget_native_data(path: &Path) -> Done<()> {
+    const BEGIN: &str = "<Metadata domain=\"NATIVE_DATA\">";
+    const END: &str = "</Metadata>";
+    let connection = open(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+    if !connection.table_exists(None, "gpkg_metadata")? {
+        return Ok(());
+    }
+    let mut texts = connection.prepare("SELECT id, metadata FROM gpkg_metadata")?;
+    let texts = texts.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    for text in texts.collect::<rusqlite::Result<Vec<(i64, String)>>>()? {
+        let (id, text) = text;
+        let Some((before, rest)) = text.split_once(BEGIN) else { continue };
+        let after = rest.split_once(END).map_or("", |(_, after)| after);
+        let update = "UPDATE gpkg_metadata SET metadata = ?2 WHERE id = ?1";
+        connection.execute(update, (id, format!("{before}{after}")))?;
+    }
+    Ok(())
 }
 
 /// Opens a GeoPackage without GDAL.
