@@ -325,6 +325,12 @@ fn crs_of(dataset: &Dataset) -> Vec<String> {
 }
 
 fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {
+    if holds_password(path) {
+        return Err(Error::Usage(format!(
+            "the {what} is a connection with a password in it, which reports and messages would repeat: give the \
+             password by a PGPASSFILE or service file, or an environment variable of the database's driver"
+        )));
+    }
     forget_failure();
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
@@ -339,6 +345,17 @@ fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dat
             allowed_drivers.map_or(String::new(), |d| format!(" (a suspect may be {})", d.join(", ")));
         Error::Unreadable(format!("the {what} {} cannot be opened: {reason}{formats}", path.display()))
     })
+}
+
+/// Whether a connection to a database says its password: as `password=…`, `pwd=…` or `scheme://user:password@host`.
+fn holds_password(path: &Path) -> bool {
+    let text = path.to_string_lossy().to_lowercase();
+    let of_url = || text.split_once("://").and_then(|(_, rest)| rest.split('/').next()?.split_once('@'));
+    !path.exists()
+        && (["password", "passwd", "pwd"]
+            .iter()
+            .any(|word| text.split(word).skip(1).any(|rest| rest.trim_start().starts_with('=')))
+            || of_url().is_some_and(|(user, _)| user.contains(':')))
 }
 
 fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: Target) -> Result<Survey> {
