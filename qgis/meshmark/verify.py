@@ -134,12 +134,15 @@ class Verify(Algorithm):
         return {**results, **{name: path for name, path in written.items() if path}}
 
     def _add_layers(self, evidence, context):
-        # They are added in the order of their names, the later one above the other.
-        for layer, title in [
-            ("vertex_displacements", tr("Displacements")),
-            ("patches", tr("Patches")),
-        ]:
+        # From below to above: QGIS 3.36 and later go by the key, earlier ones by the names.
+        for key, (layer, title) in enumerate(
+            [
+                ("patches", tr("Patches")),
+                ("vertex_displacements", tr("Displacements")),
+            ]
+        ):
             details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
+            details.layerSortKey = key
             details.setPostProcessor(styles.processor(layer))
             context.addLayerToLoadOnCompletion(f"{evidence}|layername={layer}", details)
 
