@@ -18,7 +18,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts qgis plugin-for-wheel deb install \
+.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -69,7 +69,8 @@ conformance: build
 	host-tests/conformance/run.sh
 
 # A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the wheel's GDAL and one that is
-# compiled, which takes half an hour the first time, the examples, a clean Debian; installs what they need.
+# compiled, Debian 13 with its GDAL and QGIS, the examples, the package in a clean Debian; installs what they need. Takes an
+# hour and a half the first time.
 hosts: build plugin-for-wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
@@ -78,8 +79,13 @@ hosts: build plugin-for-wheel
 	host-tests/hosts/chromium.sh
 	host-tests/hosts/wheel.sh
 	host-tests/hosts/gdal_3_12.sh
+	host-tests/hosts/debian.sh trixie
 	host-tests/hosts/examples.sh
 	host-tests/hosts/deb.sh
+
+# How long a newcomer waits: for `make demo` on a clean machine, for the first marked file, for a report.
+newcomer:
+	host-tests/newcomer.sh
 
 # The zip for QGIS's plugin manager: the same bytes for the same sources.
 qgis:

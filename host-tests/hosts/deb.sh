@@ -2,37 +2,27 @@
 # Installs the Debian package into a clean root, uses it there as the README says, and removes it. Installs debootstrap
 # where it is missing, and needs root, or sudo, for the clean root.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+source "$hosts/clean_debian.sh"
 
 unset GDAL_DRIVER_PATH # the package's driver is to be found without it
 install_missing debootstrap dpkg-dev
-as_root=()
-[ "$(id -u)" -eq 0 ] || as_root=(sudo)
 package=$("$root/packaging/deb.sh" "$build" "$work/package")
 clean=$work/root
-trap '"${as_root[@]}" rm -rf "$work"' EXIT
-mirror=$(apt-get indextargets --format '$(SITE)' 'Codename: bookworm' 'Created-By: Packages' 2>/dev/null | grep -v security | head -n 1) || true
-"${as_root[@]}" debootstrap --variant=minbase bookworm "$clean" ${mirror:+"$mirror"} >"$work/log" 2>&1 ||
-    fail "debootstrap: $(tail -n 5 "$work/log")"
+new_root bookworm "$clean"
 "${as_root[@]}" cp "$package" "$fixture" "$clean/root/"
 
-# inside WHAT COMMAND: in the clean root, in /root.
-inside() {
-    "${as_root[@]}" chroot "$clean" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 \
-        DEBIAN_FRONTEND=noninteractive bash -c "cd && $2" >"$work/log" 2>&1 || fail "$1: $(tail -n 20 "$work/log")"
-}
-
-inside "installing the package" "apt-get update -q && apt-get install -y -q --no-install-recommends gdal-bin ./$(basename "$package")"
+in_root "$clean" "installing the package" "apt-get update -q && apt-get install -y -q --no-install-recommends gdal-bin ./$(basename "$package")"
 passed "$(basename "$package") installs"
-inside "ogrinfo" "ogrinfo --formats | grep 'MESHMARK -vector-'"
+in_root "$clean" "ogrinfo" "ogrinfo --formats | grep 'MESHMARK -vector-'"
 passed "ogrinfo --formats lists MESHMARK"
-inside "the README's commands" "meshmark keygen key.json &&
+in_root "$clean" "the README's commands" "meshmark keygen key.json &&
     ogr2ogr -f GPKG marked.gpkg MESHMARK:kotka.gpkg -oo KEY=key.json -oo RECIPIENT='ACME GmbH' -oo RECORD=acme.json &&
     meshmark verify --key key.json --reference kotka.gpkg --record acme.json marked.gpkg | grep '^verdict: *MATCH'"
 passed "the README's commands mark and verify"
-inside "the documents" "zcat /usr/share/man/man1/meshmark-verify.1.gz | grep -q records &&
+in_root "$clean" "the documents" "zcat /usr/share/man/man1/meshmark-verify.1.gz | grep -q records &&
     source /usr/share/bash-completion/completions/meshmark && complete -p meshmark &&
     test -s /usr/share/doc/meshmark/copyright && test -s /usr/share/zsh/vendor-completions/_meshmark"
 passed "man pages and completions are there"
-inside "removing the package" "cp /var/lib/dpkg/info/meshmark.list list && apt-get purge -y -q meshmark && ! ogrinfo --formats | grep MESHMARK &&
+in_root "$clean" "removing the package" "cp /var/lib/dpkg/info/meshmark.list list && apt-get purge -y -q meshmark && ! ogrinfo --formats | grep MESHMARK &&
     while read -r path; do test -d \"\$path\" || ! test -e \"\$path\" || exit 1; done <list && ! test -e /usr/share/doc/meshmark"
 passed "removal leaves nothing"

@@ -69,3 +69,67 @@ fn the_commands_of_the_page_about_many_recipients_work() {
     assert!(blocks.len() >= 2);
     blocks.iter().for_each(|block| assert_works("docs/distribute.md", &commands(block).join("\n")));
 }
+
+/// The documents people read, as paths from the root.
+fn documents() -> Vec<String> {
+    let folders = ["", "docs/", "examples/", "fixtures/", "fixtures/vectors/"];
+    let pages = folders.iter().flat_map(|folder| {
+        let entries = fs::read_dir(fixture("..").join(folder)).unwrap();
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(".md")).map(move |name| format!("{folder}{name}"))
+    });
+    pages.collect()
+}
+
+/// What a link to a heading calls it.
+fn anchors(text: &str) -> Vec<String> {
+    let headings = text.lines().filter_map(|line| line.strip_prefix('#'));
+    let slug = |heading: &str| -> String {
+        let kept = heading.trim_start_matches('#').trim().to_lowercase();
+        let kept = kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+        kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+    };
+    headings.map(slug).collect()
+}
+
+#[test]
+fn every_link_of_the_documents_leads_somewhere() {
+    let root = fixture("..");
+    let mut links = 0;
+    for document in documents() {
+        let text = fs::read_to_string(root.join(&document)).unwrap();
+        let after = text.split("](").skip(1).chain(text.split("src=\"").skip(1));
+        for link in after.filter_map(|rest| rest.split([')', '"']).next()) {
+            if link.starts_with("http") {
+                continue;
+            }
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let folder = root.join(&document).parent().unwrap().to_path_buf();
+            let file = if file.is_empty() { root.join(&document) } else { folder.join(file) };
+            assert!(file.exists(), "{document}: {link}");
+            let is_there =
+                || fs::read_to_string(&file).is_ok_and(|text| anchors(&text).contains(&heading.to_string()));
+            assert!(heading.is_empty() || is_there(), "{document}: {link}");
+            links += 1;
+        }
+    }
+    assert!(links > 50);
+}
+
+#[test]
+fn every_make_target_of_the_documents_is_one() {
+    let makefile = fs::read_to_string(fixture("../Makefile")).unwrap().replace("\\\n", " ");
+    let targets = makefile.lines().find_map(|line| line.strip_prefix(".PHONY:")).unwrap();
+    let targets: Vec<&str> = targets.split_whitespace().collect();
+    let mut named = 0;
+    for document in documents() {
+        let text = fs::read_to_string(fixture("..").join(&document)).unwrap();
+        for rest in text.split("`make ").skip(1).chain(text.split("\nmake ").skip(1)) {
+            let target =
+                rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '-').next().unwrap_or_default();
+            assert!(targets.contains(&target), "{document}: make {target}");
+            named += 1;
+        }
+    }
+    assert!(named > 10);
+}

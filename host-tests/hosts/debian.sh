@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# In a clean Debian of another suite, with the GDAL and the QGIS that it has: builds driver and command, runs the tests of
+# every crate that knows GDAL, and the QGIS plugin with qgis_plugin.sh. Installs debootstrap where it is missing, and needs
+# root, or sudo.
+# Usage: debian.sh SUITE
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+source "$hosts/clean_debian.sh"
+
+[ $# -eq 1 ] || fail "name a suite of Debian, such as trixie"
+suite=$1 host="$host $1" debian=$work/debian
+install_missing debootstrap
+new_root "$suite" "$debian"
+mounts=("$(rustc --print sysroot) /opt/rust" "$root /meshmark")
+
+# here WHAT COMMAND: in the checkout, where what is compiled stays, apart from that for this machine's GDAL.
+here() {
+    in_root "$debian" "$1" "cd /meshmark && export CARGO_TARGET_DIR=/meshmark/target/$suite && $2"
+}
+
+here "git and make" "apt-get update -q && apt-get install -y -q --no-install-recommends ca-certificates git make"
+here "make build" "make -s build BUILD=target/$suite/release"
+here "GDAL" "ogr2ogr --version"
+gdal=$(tail -n 1 "$work/log")
+here "the tests" "cargo test --release --locked --no-fail-fast -p meshmark-dataset -p meshmark-plugin -p meshmark-verifier \
+    -p meshmark-host-tests"
+passed "$(awk '/^test result: ok/ { n += $4 } END { print n }' "$work/log") tests with $gdal"
+here "the QGIS plugin" "host-tests/hosts/qgis_plugin.sh"
+grep '^passed' "$work/log"
+here "QGIS" "dpkg-query -W -f '\${Version}' qgis"
+passed "the plugin in QGIS $(cat "$work/log")"
