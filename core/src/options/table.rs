@@ -1,0 +1,207 @@
+//! The table of the options, and how they are written.
+
+use super::{Laplacian, Shape};
+use crate::code::Code;
+
+/// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
+/// need minutes and gigabytes a solve.
+pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
+
+/// What an option's value must be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Any text that is not empty.
+    Text,
+    /// A number, greater than the first bound, at most the second.
+    Number(f64, f64),
+    /// A whole number between two bounds, both legal.
+    Integer(usize, usize),
+    /// One of these words, in any case.
+    Choice(&'static [&'static str]),
+}
+
+impl Kind {
+    /// What a legal value is, to complete "… is not".
+    pub(crate) fn legal(&self) -> String {
+        match self {
+            Kind::Text => "a text".into(),
+            Kind::Number(above, most) => format!("a number greater than {above} and at most {most}"),
+            Kind::Integer(least, most) => format!("a whole number from {least} to {most}"),
+            Kind::Choice(words) => words.join(" or "),
+        }
+    }
+}
+
+/// How a front end writes options, so that a message names what its user typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spelling {
+    /// The driver: `PATCH_SIZE`, `PATCH_SIZE=480`.
+    OpenOption,
+    /// The command line: `--patch-size`, `--patch-size 480`.
+    Flag,
+}
+
+impl Spelling {
+    /// An option of this name in the table.
+    pub fn name(self, name: &str) -> String {
+        match self {
+            Spelling::OpenOption => name.into(),
+            Spelling::Flag => format!("--{}", name.to_lowercase().replace('_', "-")),
+        }
+    }
+
+    /// The option with a value.
+    pub fn value(self, name: &str, value: impl std::fmt::Display) -> String {
+        let between = match self {
+            Spelling::OpenOption => "=",
+            Spelling::Flag => " ",
+        };
+        format!("{}{between}{value}", self.name(name))
+    }
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct OptionSpec {
+    /// Its name in the driver, upper case; `--lower-case` on the command line.
+    pub name: &'static str,
+    /// What its value must be.
+    pub kind: Kind,
+    /// Its value when it is not given.
+    pub default: Option<&'static str>,
+    /// One sentence for the docs and for the driver's option list.
+    pub help: &'static str,
+    /// Whether it shapes the mark, so that `meshmark verify` needs it when there is no record.
+    pub shapes_mark: bool,
+}
+
+const fn row(
+    name: &'static str,
+    kind: Kind,
+    default: Option<&'static str>,
+    shapes_mark: bool,
+    help: &'static str,
+) -> OptionSpec {
+    OptionSpec { name, kind, default, help, shapes_mark }
+}
+
+/// All options, in the order of the docs.
+pub const OPTIONS: &[OptionSpec] = &[
+    row(
+        "KEY",
+        Kind::Text,
+        None,
+        false,
+        "Key file made by `meshmark keygen`; or configuration option MESHMARK_KEY",
+    ),
+    row(
+        "RECIPIENT",
+        Kind::Text,
+        None,
+        true,
+        "Who receives this copy; the message is 128 bits of a keyed hash of this text",
+    ),
+    row(
+        "MESSAGE",
+        Kind::Text,
+        None,
+        true,
+        "The message itself, 2 to 256 hexadecimal digits, instead of a recipient",
+    ),
+    row(
+        "AMPLITUDE",
+        Kind::Number(0.0, 1e6),
+        Some("0.10"),
+        true,
+        "Amplitude of every coefficient, metres on the ground",
+    ),
+    row(
+        "CODE",
+        Kind::Choice(&Code::NAMES),
+        None,
+        true,
+        "LDPC turns 128 message bits into 256 that correct errors, REPETITION carries any number as they are; by \
+         default LDPC for 128 bits, otherwise REPETITION",
+    ),
+    row(
+        "CHIP_RATE",
+        Kind::Integer(1, 2048),
+        None,
+        true,
+        "Coefficients that carry each of those bits, per patch and axis; by default 1 with LDPC, 2 with REPETITION",
+    ),
+    row(
+        "PATCH_SIZE",
+        Kind::Integer(PATCH_SIZE_RANGE.0, PATCH_SIZE_RANGE.1),
+        Some("480"),
+        true,
+        "Smallest number of vertices in a patch",
+    ),
+    row(
+        "TOLERANCE",
+        Kind::Number(0.0, 1e6),
+        Some("0.75"),
+        true,
+        "No vertex moves further than this, metres on the ground",
+    ),
+    row(
+        "PRECISION",
+        Kind::Number(0.0, 1e6),
+        None,
+        true,
+        "Grid of the marked coordinates, CRS units; none by default",
+    ),
+    row(
+        "LAYERS",
+        Kind::Text,
+        None,
+        true,
+        "Comma-separated layers to mark together; the others pass unchanged; all by default",
+    ),
+    row(
+        "SHAPE",
+        Kind::Choice(&Shape::NAMES),
+        Some("FREE"),
+        true,
+        "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them",
+    ),
+    row(
+        "BASIS",
+        Kind::Choice(&Laplacian::NAMES),
+        Some("BIGGS"),
+        true,
+        "Mesh Laplacian: BIGGS is that of the paper; COTANGENT bends angles less and needs the very same reference",
+    ),
+    row("SRS", Kind::Text, None, true, "CRS of the source when it has none, for example EPSG:3067"),
+    row(
+        "RECORD",
+        Kind::Text,
+        None,
+        false,
+        "Record file to write: what an auditor needs besides the key and the reference",
+    ),
+];
+
+/// What the driver needs besides when it writes, in the order of the docs.
+pub const CREATION_OPTIONS: &[OptionSpec] = &[
+    row(
+        "REFERENCE",
+        Kind::Text,
+        None,
+        false,
+        "GeoPackage to write with the unmarked map as it arrived, which verification needs; required",
+    ),
+    row(
+        "FORMAT",
+        Kind::Text,
+        None,
+        false,
+        "Short name of the GDAL driver that writes the marked map; by default the one of the file name extension",
+    ),
+    row("OVERWRITE", Kind::Choice(&["NO", "YES"]), Some("NO"), false, "Replace the file when it exists"),
+];
+
+/// Looks a row up by its name, in any case.
+pub fn spec(name: &str) -> Option<&'static OptionSpec> {
+    OPTIONS.iter().find(|o| o.name.eq_ignore_ascii_case(name))
+}
