@@ -6,14 +6,13 @@ import os
 import sys
 import time
 import traceback
-from collections import Counter
 
 import processing
 from osgeo import gdal
 from processing.gui.AlgorithmDialog import AlgorithmDialog
 from qgis.core import QgsApplication, QgsProject, QgsSettings
-from qgis.PyQt.QtCore import Qt, QTimer
-from qgis.PyQt.QtGui import QColor, QImage
+from qgis.PyQt.QtCore import QTimer
+from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtWidgets import QApplication, QDockWidget, QToolBar
 from qgis.utils import iface
 
@@ -38,12 +37,7 @@ def settle(seconds=1.0):
 def picture(widget, name):
     settle()
     wait_for(lambda: not iface.mapCanvas().isDrawing(), "the map")
-    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
-    pixels = image.constBits()
-    pixels.setsize(image.sizeInBytes())
-    colours = [colour for colour, _ in Counter(memoryview(pixels).cast("B").cast("I")).most_common(256)]
-    few = image.convertToFormat(QImage.Format.Format_Indexed8, colours, Qt.ImageConversionFlag.AvoidDither)
-    assert few.save(os.path.join(PICTURES, name), "PNG", 0)
+    assert widget.grab().save(os.path.join(PICTURES, name), "PNG", 0)
 
 
 def tidy_window():
@@ -53,6 +47,7 @@ def tidy_window():
         bar.hide()
     for dock in window.findChildren(QDockWidget):
         dock.setVisible(dock.objectName() == "Layers")
+    window.statusBar().hide()
     iface.messageBar().clearWidgets()
 
 
@@ -109,6 +104,7 @@ def verify():
     leak(f"{WORK}/by_menu.gpkg", f"{WORK}/suspect.gpkg")
     suspect = iface.addVectorLayer(f"{WORK}/suspect.gpkg|layername=buildings", "suspect", "ogr")
     suspect.renderer().symbol().setColor(QColor("#d9d4c8"))
+    iface.layerTreeView().refreshLayerSymbology(suspect.id())
     results = processing.runAndLoadResults(
         "meshmark:verify",
         {
@@ -129,8 +125,8 @@ def verify():
         assert layer.renderer().type() == "RuleRenderer", layer.renderer().type()
     order = [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()]
     assert order.index("Displacements") < order.index("Patches"), f"patches hide the vertices: {order}"
-    QgsProject.instance().layerTreeRoot().findLayer(patches).setExpanded(True)
-    iface.mapCanvas().setExtent(patches.extent())
+    iface.layerTreeView().expandAllNodes()
+    iface.mapCanvas().setExtent(patches.extent().buffered(20))
     picture(iface.mainWindow(), "qgis-evidence.png")
 
 
