@@ -8,6 +8,7 @@ sys.path[:0] = ["/usr/share/qgis/python/plugins", sys.argv[1]]
 
 import folder
 from meshmark.provider import MeshmarkProvider
+from osgeo import gdal
 from processing.core.Processing import Processing
 from qgis.core import (
     QgsApplication,
@@ -19,6 +20,7 @@ from qgis.core import (
     QgsProcessingModelChildAlgorithm,
     QgsProcessingModelChildParameterSource,
     QgsProject,
+    QgsRasterLayer,
     QgsSettings,
     QgsVectorLayer,
 )
@@ -151,6 +153,40 @@ def verify_again():
     print("passed: qgis_plugin: verified twice in one session", flush=True)
 
 
+def no_layers():
+    """What cannot be read is not taken for an empty layer, and a raster not for a traceback."""
+    gdal.GetDriverByName("GTiff").Create(f"{HERE}/raster.tif", 4, 4)
+    broken = QgsVectorLayer("url='http://127.0.0.1:9/' typename='x'", "broken", "WFS")
+    for layer, why in [
+        (broken, "The layer broken cannot be read"),
+        (QgsRasterLayer(f"{HERE}/raster.tif", "raster"), "raster is no vector layer"),
+    ]:
+        feedback = QgsProcessingFeedback(False)
+        with folder.unchanged(f"qgis_plugin: {why}"):
+            try:
+                export("other", [of_map("buildings"), layer], feedback)
+            except QgsProcessingException:
+                assert why in feedback.textLog() and "Traceback" not in feedback.textLog(), feedback.textLog()
+            else:
+                raise AssertionError(f"no error that says {why}")
+
+
+def both_files_or_none():
+    """The report cannot be written once the evidence map has its name."""
+    import processing
+
+    given = {"REFERENCE": f"{HERE}/records/filtered.reference.gpkg", "SUSPECT": f"{HERE}/filtered.gpkg"}
+    places = {"KEY": f"{HERE}/key.json", "RECORD": f"{HERE}/records/filtered.json"}
+    with folder.unchanged("qgis_plugin: a report that fails takes the evidence map back"):
+        try:
+            one = {"EVIDENCE_MAP": f"{HERE}/one.html", "REPORT": f"{HERE}/one.html"}
+            processing.run("meshmark:verify", {**given, **places, **one})
+        except QgsProcessingException as error:
+            assert "one.html cannot be written" in str(error), error
+        else:
+            raise AssertionError("one file for two is not refused")
+
+
 def no_command(name, content):
     """A program in the settings that is not meshmark is one sentence, too."""
     import processing
@@ -213,6 +249,8 @@ def fail_without_a_trace():
     fails("exists: choose another file", "memory", [buildings])
     fails("does not exist: make it", "none/other", [buildings])
     fails("is the file of the layer buildings itself", "map", [buildings], OVERWRITE=True)
+    both_files_or_none()
+    no_layers()
     no_command("of_another_machine", b"\x7fELF of another machine")
     no_command("silent", b"#!/bin/sh\n")
     no_command("another_json", b"#!/bin/sh\necho '{}'\n")

@@ -97,6 +97,19 @@ def run(arguments, feedback, on_output=lambda text: None):
 
 
 @contextlib.contextmanager
+def all_or_nothing(paths):
+    """Takes back the files that came into being when what writes them is cancelled or fails between them."""
+    new = [path for path in paths if path and not os.path.lexists(path)]
+    try:
+        yield
+    except BaseException:
+        for path in new:
+            with contextlib.suppress(FileNotFoundError):
+                os.remove(path)
+        raise
+
+
+@contextlib.contextmanager
 def _startable(program):
     """Says so when the system cannot start a program: one of another machine, or no program at all."""
     try:

@@ -149,6 +149,8 @@ def export(source, output, options, feedback):
         feedback.pushWarning(warning)
     if finished.code != 0 or not os.path.exists(output):
         ended = tr("ogr2ogr ended with exit code {}.").format(finished.code)
+        if "Unable to find driver" in finished.errors:
+            errors.append(tr("Is the folder in Settings > Options > meshmark that of a driver for this GDAL?"))
         raise QgsProcessingException("\n".join(errors or [ended]))
 
 

@@ -8,6 +8,7 @@ from qgis.core import (
     QgsProcessingException,
     QgsProviderRegistry,
     QgsVectorFileWriter,
+    QgsVectorLayer,
     QgsVectorLayerFeatureSource,
 )
 
@@ -21,6 +22,11 @@ class Snapshot:
     """What a layer shows now, with its filter and unsaved edits: made by the main thread, read by any."""
 
     def __init__(self, layer):
+        if not isinstance(layer, QgsVectorLayer):
+            raise QgsProcessingException(tr("{} is no vector layer: leave it out.").format(layer.name()))
+        if not layer.isValid():
+            # It would be taken for an empty one.
+            raise QgsProcessingException(tr("The layer {} cannot be read: repair its source.").format(layer.name()))
         self.name = own_name(layer)
         self.file = path_of(layer)
         self.fields = layer.fields()

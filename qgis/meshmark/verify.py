@@ -119,7 +119,8 @@ class Verify(Algorithm):
             arguments += ["--reference", file_of_map(self._reference, staging, "reference", context, feedback)]
             arguments += ["--", file_of_map(self._suspect, staging, "suspect", context, feedback)]
             feedback.setProgressText(tr("Verifying"))
-            found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
+            with commands.all_or_nothing([evidence, self._report.path]):
+                found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
         for line in summary(found):
             feedback.pushInfo(line)
         if evidence and context.project():
