@@ -2,8 +2,8 @@
 
 use crate::{Error, Result};
 
-/// A message of fewer bits is shared by too many recipients to identify one.
-pub const LEAST_IDENTIFYING_BITS: usize = 20;
+/// Fewer bits, read without an error, agree by chance more often than once in a million times.
+pub const LEAST_IDENTIFYING_BITS: usize = 24;
 
 /// A message: m bits, a multiple of four, most significant bit of the first hex digit first.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,6 +8,7 @@ sys.path[:0] = ["/usr/share/qgis/python/plugins", sys.argv[1]]
 
 import folder
 from meshmark.provider import MeshmarkProvider
+from osgeo import gdal
 from processing.core.Processing import Processing
 from qgis.core import (
     QgsApplication,
@@ -18,6 +19,9 @@ from qgis.core import (
     QgsProcessingModelAlgorithm,
     QgsProcessingModelChildAlgorithm,
     QgsProcessingModelChildParameterSource,
+    QgsProject,
+    QgsRasterLayer,
+    QgsSettings,
     QgsVectorLayer,
 )
 
@@ -105,7 +109,10 @@ def export_layers():
     assert filtered.setSubsetString("fid % 10 <> 0")
     export("filtered", [filtered])
     assert 0 < count(f"{HERE}/filtered.gpkg") == filtered.featureCount() < of_map("buildings").featureCount()
+    QgsSettings().setValue("meshmark/driver_folder", f"{HERE}/records")
+    # A folder without a driver in the settings does no harm where the driver is installed.
     export("degrees", [QgsVectorLayer(f"{HERE}/europe.gpkg", "first layer", "ogr")])
+    QgsSettings().remove("meshmark/driver_folder")
     written = export("joined", [of_map("roads"), of_map("buildings"), of_map("roads")])
     assert [path.partition("|layername=")[2] for path in written["MARKED_LAYERS"]] == ["roads", "buildings", "roads 2"]
 
@@ -127,6 +134,77 @@ def verify_what_a_layer_shows():
     )
     assert found["VERDICT"] == "match" and found["RECIPIENT"] == "ACME GmbH", found
     print("passed: qgis_plugin: the half of a map that a layer shows verifies", flush=True)
+
+
+def verify_again():
+    """The second run of a session, and its layers, are as good as the first; no match names nobody."""
+    import processing
+
+    for run, (suspect, verdict, recipient) in enumerate(
+        [("filtered.gpkg", "match", "ACME GmbH"), ("records/filtered.reference.gpkg", "no-match", "")]
+    ):
+        context = QgsProcessingContext()
+        context.setProject(QgsProject.instance())
+        given = {"REFERENCE": f"{HERE}/records/filtered.reference.gpkg", "SUSPECT": f"{HERE}/{suspect}"}
+        places = {"KEY": f"{HERE}/key.json", "RECORDS": f"{HERE}/records", "EVIDENCE_MAP": f"{HERE}/evidence{run}.gpkg"}
+        found = processing.run("meshmark:verify", {**given, **places}, context=context)
+        assert (found["VERDICT"], found["RECIPIENT"]) == (verdict, recipient), found
+        assert len(context.layersToLoadOnCompletion()) == 2, run
+    print("passed: qgis_plugin: verified twice in one session", flush=True)
+
+
+def no_layers():
+    """What cannot be read is not taken for an empty layer, and a raster not for a traceback."""
+    gdal.GetDriverByName("GTiff").Create(f"{HERE}/raster.tif", 4, 4)
+    broken = QgsVectorLayer("url='http://127.0.0.1:9/' typename='x'", "broken", "WFS")
+    for layer, why in [
+        (broken, "The layer broken cannot be read"),
+        (QgsRasterLayer(f"{HERE}/raster.tif", "raster"), "raster is no vector layer"),
+    ]:
+        feedback = QgsProcessingFeedback(False)
+        with folder.unchanged(f"qgis_plugin: {why}"):
+            try:
+                export("other", [of_map("buildings"), layer], feedback)
+            except QgsProcessingException:
+                assert why in feedback.textLog() and "Traceback" not in feedback.textLog(), feedback.textLog()
+            else:
+                raise AssertionError(f"no error that says {why}")
+
+
+def both_files_or_none():
+    """The report cannot be written once the evidence map has its name."""
+    import processing
+
+    given = {"REFERENCE": f"{HERE}/records/filtered.reference.gpkg", "SUSPECT": f"{HERE}/filtered.gpkg"}
+    places = {"KEY": f"{HERE}/key.json", "RECORD": f"{HERE}/records/filtered.json"}
+    with folder.unchanged("qgis_plugin: a report that fails takes the evidence map back"):
+        try:
+            one = {"EVIDENCE_MAP": f"{HERE}/one.html", "REPORT": f"{HERE}/one.html"}
+            processing.run("meshmark:verify", {**given, **places, **one})
+        except QgsProcessingException as error:
+            assert "one.html cannot be written" in str(error), error
+        else:
+            raise AssertionError("one file for two is not refused")
+
+
+def no_command(name, content):
+    """A program in the settings that is not meshmark is one sentence, too."""
+    import processing
+
+    path = f"{HERE}/{name}"
+    with open(path, "wb") as file:
+        file.write(content)
+    os.chmod(path, 0o755)
+    QgsSettings().setValue("meshmark/command", path)
+    maps = [f"{HERE}/records/filtered.reference.gpkg", f"{HERE}/filtered.gpkg"]
+    try:
+        processing.run("meshmark:compare", dict(zip(["ORIGINAL", "MARKED"], maps)))
+    except QgsProcessingException as error:
+        assert "Settings > Options > meshmark" in str(error) and "Traceback" not in str(error), error
+    else:
+        raise AssertionError(f"{name} is not refused")
+    finally:
+        QgsSettings().remove("meshmark/command")
 
 
 def model():
@@ -170,6 +248,12 @@ def fail_without_a_trace():
     fails("Incorrect parameter value for AMPLITUDE", "wrong", [buildings], AMPLITUDE=1e9)
     fails("exists: choose another file", "memory", [buildings])
     fails("does not exist: make it", "none/other", [buildings])
+    fails("is the file of the layer buildings itself", "map", [buildings], OVERWRITE=True)
+    both_files_or_none()
+    no_layers()
+    no_command("of_another_machine", b"\x7fELF of another machine")
+    no_command("silent", b"#!/bin/sh\n")
+    no_command("another_json", b"#!/bin/sh\necho '{}'\n")
 
 
 application = QgsApplication([], False)
@@ -180,5 +264,6 @@ assert QgsApplication.processingRegistry().addProvider(provider)
 os.mkdir("records")
 export_layers()
 verify_what_a_layer_shows()
+verify_again()
 run_in_a_model()
 fail_without_a_trace()

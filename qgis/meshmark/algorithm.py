@@ -102,6 +102,12 @@ def file_of_map(given, folder, name, context, feedback):
     if isinstance(given, str):
         return given
     path = os.path.join(folder, f"{name}.gpkg")
+    feedback.pushWarning(
+        tr(
+            "{} is no file, or is filtered or edited: a copy of what it shows is compared, and deleted afterwards. For a"
+            " report that others can repeat, save the layer to a file and choose that."
+        ).format(given.name)
+    )
     layers.copy([given], path, context, feedback)
     return path
 

@@ -1,5 +1,6 @@
 """The programs the plugin runs: `meshmark` and GDAL's `ogr2ogr`. A run can be cancelled."""
 
+import contextlib
 import os
 import re
 import shutil
@@ -61,20 +62,22 @@ def ogr2ogr():
 
 def has_option(subcommand, option):
     """Whether `meshmark SUBCOMMAND` of the installed version has an option."""
-    asked = subprocess.run([meshmark(), subcommand, "--help"], capture_output=True, **_without_window())
+    with _startable(meshmark()):
+        asked = subprocess.run([meshmark(), subcommand, "--help"], capture_output=True, **_without_window())
     return re.search(rb"^\s+%s\b" % re.escape(option.encode()), asked.stdout, re.MULTILINE) is not None
 
 
 def run(arguments, feedback, on_output=lambda text: None):
     """Runs a program to its end; `on_output` is told what it prints. Raises Cancelled when the user cancels."""
-    process = subprocess.Popen(
-        arguments,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env=driver.environment(),
-        **_without_window(),
-    )
+    with _startable(arguments[0]):
+        process = subprocess.Popen(
+            arguments,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=driver.environment(),
+            **_without_window(),
+        )
     output, errors = bytearray(), bytearray()
     readers = [
         threading.Thread(target=_drain, args=pair, daemon=True)
@@ -91,6 +94,32 @@ def run(arguments, feedback, on_output=lambda text: None):
         for reader in readers:
             reader.join()
     return Finished(process.returncode, output.decode(errors="replace"), errors.decode(errors="replace"))
+
+
+@contextlib.contextmanager
+def all_or_nothing(paths):
+    """Takes back the files that came into being when what writes them is cancelled or fails between them."""
+    new = [path for path in paths if path and not os.path.lexists(path)]
+    try:
+        yield
+    except BaseException:
+        for path in new:
+            with contextlib.suppress(FileNotFoundError):
+                os.remove(path)
+        raise
+
+
+@contextlib.contextmanager
+def _startable(program):
+    """Says so when the system cannot start a program: one of another machine, or no program at all."""
+    try:
+        yield
+    except OSError as error:
+        raise Missing(
+            tr("{} cannot be started ({}): correct its path in Settings > Options > meshmark, or install it again.").format(
+                program, error.strerror or error
+            )
+        ) from error
 
 
 def _is_running(process):

@@ -74,7 +74,8 @@ class Compare(Algorithm):
             arguments += ["--", file_of_map(self._original, staging, "original", context, feedback)]
             arguments += [file_of_map(self._marked, staging, "marked", context, feedback)]
             feedback.setProgressText(tr("Comparing"))
-            found = answer(commands.run(arguments, feedback), (0,), feedback)
+            with commands.all_or_nothing([self._report.path]):
+                found = answer(commands.run(arguments, feedback), (0,), feedback)
         results = {name: found[section][figure] for name, _, (section, figure) in figures()}
         for name, label, _ in figures():
             feedback.pushInfo(f"{label}: {results[name]:.6g}")

@@ -1,6 +1,7 @@
 """The GDAL driver MESHMARK: where it is, which options it has, and how an export that was killed is cleared away."""
 
 import contextlib
+import glob
 import os
 from collections import namedtuple
 from xml.etree import ElementTree
@@ -63,7 +64,8 @@ def environment():
     """The environment of a child process that shall find the driver."""
     variables = dict(os.environ)
     folder = settings.get(settings.DRIVER_FOLDER)
-    if folder:
+    # It replaces the folder where GDAL finds an installed driver, so one without a driver must not.
+    if folder and glob.glob(os.path.join(glob.escape(folder), "ogr_MESHMARK.*")):
         variables["GDAL_DRIVER_PATH"] = folder
     return variables
 

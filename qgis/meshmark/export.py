@@ -110,6 +110,7 @@ class Export(Algorithm):
         values = {o.name: parameters.value(self, o, given, context) for o in self._options}
         folder = self.parameterAsString(given, "RECORDS", context)
         check_places(output, folder, values.get("OVERWRITE") == "YES")
+        check_is_no_source(output, self._snapshots)
         record, reference = free_names(folder, os.path.splitext(os.path.basename(output))[0])
         values.update(KEY=self.parameterAsString(given, "KEY", context), RECORD=record, REFERENCE=reference)
         options = [f"{name}={value}" for name, value in values.items() if value]
@@ -148,6 +149,8 @@ def export(source, output, options, feedback):
         feedback.pushWarning(warning)
     if finished.code != 0 or not os.path.exists(output):
         ended = tr("ogr2ogr ended with exit code {}.").format(finished.code)
+        if "Unable to find driver" in finished.errors:
+            errors.append(tr("Is the folder in Settings > Options > meshmark that of a driver for this GDAL?"))
         raise QgsProcessingException("\n".join(errors or [ended]))
 
 
@@ -169,6 +172,15 @@ def check_places(output, folder, overwrite):
         raise QgsProcessingException(
             tr("{} exists: choose another file, or let it be replaced (OVERWRITE).").format(output)
         )
+
+
+def check_is_no_source(output, snapshots):
+    """Only the layers of this export would be left of the file, and those only marked."""
+    for snapshot in snapshots:
+        if snapshot.file and os.path.exists(output) and os.path.samefile(snapshot.file, output):
+            raise QgsProcessingException(
+                tr("{} is the file of the layer {} itself: choose another file.").format(output, snapshot.name)
+            )
 
 
 def free_names(folder, stem):

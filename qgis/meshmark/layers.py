@@ -8,6 +8,7 @@ from qgis.core import (
     QgsProcessingException,
     QgsProviderRegistry,
     QgsVectorFileWriter,
+    QgsVectorLayer,
     QgsVectorLayerFeatureSource,
 )
 
@@ -21,7 +22,13 @@ class Snapshot:
     """What a layer shows now, with its filter and unsaved edits: made by the main thread, read by any."""
 
     def __init__(self, layer):
+        if not isinstance(layer, QgsVectorLayer):
+            raise QgsProcessingException(tr("{} is no vector layer: leave it out.").format(layer.name()))
+        if not layer.isValid():
+            # It would be taken for an empty one.
+            raise QgsProcessingException(tr("The layer {} cannot be read: repair its source.").format(layer.name()))
         self.name = own_name(layer)
+        self.file = path_of(layer)
         self.fields = layer.fields()
         self.type = layer.wkbType()
         self.crs = layer.crs()
@@ -40,12 +47,17 @@ def own_name(layer):
     return table if table and layer.name() in generated else layer.name()
 
 
+def path_of(layer):
+    """The file a layer comes from; None when it is no local file."""
+    path = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source()).get("path") or ""
+    return path if os.path.exists(path) else None
+
+
 def file_of(layer):
     """The file a layer shows as it is; None when the layer filters it, has unsaved edits or is no local file."""
     if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
         return None
-    path = QgsProviderRegistry.instance().decodeUri("ogr", layer.source()).get("path", "")
-    return path if os.path.exists(path) else None
+    return path_of(layer)
 
 
 def copy(snapshots, path, context, feedback):
@@ -83,8 +95,11 @@ def _copy_one(snapshot, name, path, context, progress):
 def _check(writer, name):
     if writer.hasError() != WRITERS.WriterError.NoError:
         reason = writer.errorMessage()
-        if "fid" in reason:
-            reason += tr(" - a field fid must hold whole numbers, every one once: rename the field")
+        if "duplicate column name" in reason or ("fid" in reason and "CREATE TABLE" not in reason):
+            reason += tr(
+                " - a field fid must hold whole numbers, every one once, and no field may be called geom: rename the"
+                " field"
+            )
         raise QgsProcessingException(tr("The layer {} cannot be copied: {}").format(name, reason))
 
 

@@ -98,10 +98,11 @@ class Styler(QgsProcessingLayerPostProcessorInterface):
         layer.triggerRepaint()
 
 
-# The framework does not keep post-processors alive.
+# Until its layer is loaded nobody else keeps a post-processor alive; afterwards QGIS deletes it, so every run has its own.
 _STYLERS = {}
 
 
 def processor(name):
-    """The post-processor of the layer of this name."""
-    return _STYLERS.setdefault(name, Styler({"vertex_displacements": displacements, "patches": patches}[name]))
+    """A post-processor for the layer of this name."""
+    _STYLERS[name] = Styler({"vertex_displacements": displacements, "patches": patches}[name])
+    return _STYLERS[name]

@@ -1,6 +1,7 @@
 """Verify suspect map: what `meshmark verify` says, its report, and the evidence as layers."""
 
 import json
+import math
 import tempfile
 
 from qgis.core import (
@@ -87,7 +88,7 @@ class Verify(Algorithm):
         reports.add_parameters(self)
         self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
         self.addOutput(QgsProcessingOutputString("REASON", tr("Why")))
-        self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Recipient the verdict is about")))
+        self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Whose copy it is; empty without a match")))
         self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of error, its decimal logarithm")))
         self.addOutput(QgsProcessingOutputNumber("MATCHED_VERTICES", tr("Matched vertices")))
 
@@ -118,7 +119,8 @@ class Verify(Algorithm):
             arguments += ["--reference", file_of_map(self._reference, staging, "reference", context, feedback)]
             arguments += ["--", file_of_map(self._suspect, staging, "suspect", context, feedback)]
             feedback.setProgressText(tr("Verifying"))
-            found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
+            with commands.all_or_nothing([evidence, self._report.path]):
+                found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
         for line in summary(found):
             feedback.pushInfo(line)
         if evidence and context.project():
@@ -126,7 +128,7 @@ class Verify(Algorithm):
         results = {
             "VERDICT": found["verdict"],
             "REASON": found["reason"],
-            "RECIPIENT": found["parameters"]["recipient"],
+            "RECIPIENT": ", ".join(recipients(found)),
             "P_VALUE_LOG10": found["p_value_log10"],
             "MATCHED_VERTICES": found["vertices"]["matched"],
         }
@@ -159,15 +161,40 @@ def answer(finished, codes, feedback):
         raise QgsProcessingException("\n".join(errors or [ended]))
     for line in errors:
         feedback.pushWarning(line)
-    return json.loads(finished.output)
+    try:
+        found = json.loads(finished.output)
+    except ValueError:
+        found = None
+    if not isinstance(found, dict) or not {"meshmark_report", "meshmark_comparison"} & found.keys():
+        raise QgsProcessingException(
+            tr(
+                "{} gave no answer that can be read: is it the command meshmark, and of this version? See Settings >"
+                " Options > meshmark."
+            ).format(commands.meshmark())
+        )
+    return found
+
+
+def recipients(found):
+    """Whose copies match: several can, when copies were mixed; none without a match."""
+    if found["verdict"] != "match":
+        return []
+    if not found["candidates"]:
+        named = [found["parameters"]["recipient"]]
+    else:
+        most = math.log10(found["parameters"]["significance"])
+        tried = [entry for entry in found["candidates"]["list"] if entry["p_value_log10"] is not None]
+        named = [entry["recipient"] for entry in tried if entry["p_value_log10"] < most]
+    # Records of one recipient are one answer; a message that was given as bits names nobody.
+    return list(dict.fromkeys(filter(None, named)))
 
 
 def summary(found):
     """The answer in a few lines."""
     verdicts = {"match": tr("MATCH"), "no-match": tr("NO MATCH"), "inconclusive": tr("INCONCLUSIVE")}
     yield f"{verdicts.get(found['verdict'], found['verdict'])}: {found['reason']}"
-    recipient, p_log10 = found["parameters"]["recipient"], found["p_value_log10"]
-    if recipient and found["verdict"] == "match":
+    p_log10 = found["p_value_log10"]
+    for recipient in recipients(found):
         yield tr("Recipient: {}").format(recipient)
     if p_log10 is not None:
         yield tr("Probability of so much agreement by chance: 10^{:.1f}").format(p_log10)

@@ -2,7 +2,7 @@
 
 use crate::{
     inputs::Inputs,
-    report::Report,
+    report::{Report, printable},
     sketch::Sketch,
     verify::{Examination, Request},
 };
@@ -88,9 +88,17 @@ pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
     words.join(" ")
 }
 
-/// For a shell.
+/// For a shell; what would turn the order of what is read is written as bash, zsh and ksh read it.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
+    if printable(word) != word {
+        let escaped = word.chars().map(|c| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            c if printable(c.encode_utf8(&mut [0; 4])).starts_with(c) => c.into(),
+            c => format!("\\u{:04x}", u32::from(c)),
+        });
+        return format!("$'{}'", escaped.collect::<String>());
+    }
     match !word.is_empty() && word.chars().all(is_plain) {
         true => word.into(),
         false => format!("'{}'", word.replace('\'', r"'\''")),
@@ -117,6 +125,10 @@ mod tests {
                 "--report=b.html"
             ]),
             r"meshmark verify 'it'\''s Ä map.gpkg' --report report.html"
+        );
+        assert_eq!(
+            of(&["meshmark", "verify", "it's\u{202e}a\\b\n.gpkg"]),
+            r"meshmark verify $'it\'s\u202ea\\b\u000a.gpkg' --report report.html"
         );
         assert_eq!(
             of(&["meshmark", "compare", "--report", "a.html", "--", "--json", "-b.gpkg"]),

@@ -96,7 +96,8 @@ impl EvidenceMap {
     /// It cannot be written.
     pub fn write(&self, target: &Target) -> Result<()> {
         let failed = |reason: String| target.failed(&reason);
-        let staged = target.workplace.path().join("map.gpkg");
+        let workplace = workplace(&target.path)?;
+        let staged = workplace.path().join("map.gpkg");
         self.write_layers(&staged).map_err(|error| failed(error.to_string()))?;
         let staged = TempPath::try_from_path(staged).map_err(|error| failed(error.to_string()))?;
         staged.persist_noclobber(&target.path).map_err(|error| match error.error.kind() {
@@ -184,11 +185,10 @@ fn points(places: &[[f64; 2]]) -> gdal::errors::Result<Geometry> {
     Ok(geometry)
 }
 
-/// A file that does not exist yet, and a private folder beside it to make it in. Before a long verification it
-/// tells whether the file can be written.
+/// A file that does not exist yet. Before a long verification it tells whether the file can be written, and leaves nothing
+/// there meanwhile: a verification may be stopped.
 pub struct Target {
     path: PathBuf,
-    workplace: TempDir,
 }
 
 impl Target {
@@ -199,9 +199,8 @@ impl Target {
         if !folder.is_dir() {
             return Err(unwritable(path, "its folder does not exist"));
         }
-        let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder);
-        let workplace = workplace.map_err(|error| unwritable(path, &error.to_string()))?;
-        let target = Target { path: path.into(), workplace };
+        workplace(path)?;
+        let target = Target { path: path.into() };
         if target.path.symlink_metadata().is_ok() { Err(target.exists()) } else { Ok(target) }
     }
 
@@ -214,6 +213,24 @@ impl Target {
     }
 }
 
+/// A private folder beside the file, to make it in.
+fn workplace(path: &Path) -> Result<TempDir> {
+    let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder_of(path));
+    workplace.map_err(|error| unwritable(path, &error.to_string()))
+}
+
 fn unwritable(path: &Path, reason: &str) -> Error {
     Error::Usage(format!("{} cannot be written: {reason}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_left_where_a_verification_is_stopped() {
+        let folder = tempfile::tempdir().unwrap();
+        let _target = Target::new(&folder.path().join("map.gpkg")).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
 }

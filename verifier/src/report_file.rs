@@ -6,6 +6,7 @@ use std::{
     io::{ErrorKind, Write},
     path::{Path, PathBuf},
 };
+use tempfile::NamedTempFile;
 
 /// Where a report goes.
 pub struct ReportFile {
@@ -26,7 +27,7 @@ impl ReportFile {
     /// Checks, before anything is compared, that the file could be written.
     ///
     /// # Errors
-    /// Another extension than html and json, a file that exists, a folder that does not.
+    /// Another extension than html and json, a file that exists, a folder that does not or that may not be written to.
     pub fn new(path: &Path) -> Result<Self> {
         let refused = |reason: &str| Err(Error::Usage(format!("the report {} {reason}", path.display())));
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -42,7 +43,9 @@ impl ReportFile {
             let folder = folder_of(path).display();
             return refused(&format!("cannot be written: {folder} is no folder, make it first"));
         }
-        Ok(ReportFile { path: path.into(), format })
+        let file = ReportFile { path: path.into(), format };
+        file.temporary()?; // may the folder be written to?
+        Ok(file)
     }
 
     /// What it is.
@@ -60,26 +63,31 @@ impl ReportFile {
     /// # Errors
     /// The disk, the permissions of the folder, or a file that came into being meanwhile.
     pub fn write(&self, text: &str) -> Result<()> {
-        let failed = |error: std::io::Error| {
-            let remedy = match error.kind() {
-                ErrorKind::AlreadyExists => ", and a report is never overwritten: name another file",
-                ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-                    ": make room, or name a file on another disk"
-                }
-                _ => ": name a file in a folder you may write to",
-            };
-            Error::Usage(format!("the report {} cannot be written: {error}{remedy}", self.path.display()))
-        };
-        let mut options = tempfile::Builder::new();
-        options.prefix(".meshmark-report-");
-        #[cfg(unix)] // less the process's umask, as for any file
-        options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file =
-            options.tempfile_in(folder_of(&self.path)).map_err(|error| failed(without_path(error)))?;
+        let failed = |error| self.failed(&error);
+        let mut file = self.temporary()?;
         file.write_all(text.as_bytes()).map_err(|error| failed(without_path(error)))?;
         file.as_file().sync_all().map_err(failed)?;
         file.persist_noclobber(&self.path).map_err(|error| failed(error.error))?;
         Ok(())
+    }
+
+    fn temporary(&self) -> Result<NamedTempFile> {
+        let mut options = tempfile::Builder::new();
+        options.prefix(".meshmark-report-");
+        #[cfg(unix)] // less the process's umask, as for any file
+        options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        options.tempfile_in(folder_of(&self.path)).map_err(|error| self.failed(&without_path(error)))
+    }
+
+    fn failed(&self, error: &std::io::Error) -> Error {
+        let remedy = match error.kind() {
+            ErrorKind::AlreadyExists => ", and a report is never overwritten: name another file",
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+                ": make room, or name a file on another disk"
+            }
+            _ => ": name a file in a folder you may write to",
+        };
+        Error::Usage(format!("the report {} cannot be written: {error}{remedy}", self.path.display()))
     }
 }
 
@@ -91,6 +99,13 @@ fn without_path(error: std::io::Error) -> std::io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_that_cannot_be_written_to_is_told_before_the_work() {
+        let refused = ReportFile::new(Path::new("/proc/report.html")).err().unwrap();
+        assert!(refused.to_string().contains("cannot be written"), "{refused}");
+    }
 
     #[test]
     fn a_report_is_written_once_and_never_over_another() {

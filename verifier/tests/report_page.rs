@@ -122,6 +122,44 @@ fn the_page_of_a_comparison_is_as_written() {
     assert_golden("comparison.html", &page(folder.path(), &["compare", "kotka.gpkg", "marked.gpkg"]));
 }
 
+/// What is read of a page.
+fn words(page: &str) -> String {
+    let document = Html::parse_document(page);
+    let main = Selector::parse("main").unwrap();
+    document.select(&main).flat_map(|main| main.text()).collect()
+}
+
+#[test]
+fn a_page_without_a_match_claims_no_mark() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("records")).unwrap();
+    fs::copy(folder.path().join("record.json"), folder.path().join("records/record.json")).unwrap();
+    for records in [RECORD, ["--records", "records"]] {
+        let text = words(&page(folder.path(), &[&VERIFY[..], &records, &["kotka.gpkg"]].concat()));
+        assert!(text.contains("does not carry the mark of the copy made for “ACME GmbH”"), "{text}");
+        assert!(text.contains("A mark would be in 7 patches"));
+        assert!(
+            !text.contains("The mark is in")
+                && !text.contains("is the mark,")
+                && !text.contains("made this mark")
+        );
+        let text = words(&page(folder.path(), &[&VERIFY[..], &records, &["helsinki.gpkg"]].concat()));
+        assert!(
+            text.contains("Too few of its vertices were found") && !text.contains("The suspect was brought"),
+            "{text}"
+        );
+        assert!(!text.contains("The probability is") && !text.contains("made this mark"));
+    }
+}
+
+#[test]
+fn a_message_that_is_not_known_is_no_contradiction_to_a_key_that_shows() {
+    let folder = folder();
+    let text = words(&page(folder.path(), &[&VERIFY[..], &["--code", "REPETITION", "marked.gpkg"]].concat()));
+    assert!(text.contains("was not compared with any copy: no expected message was given"), "{text}");
+    assert!(text.contains("Some mark of this key is in the map, whatever its message."));
+}
+
 #[test]
 fn equal_input_makes_equal_reports_whatever_the_number_of_threads() {
     let folder = folder();

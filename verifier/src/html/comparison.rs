@@ -64,8 +64,12 @@ fn sentence(comparison: &Comparison, provenance: Option<&Compared>) -> Markup {
             Some(provenance) => { "In " span.name { (provenance.marked.path) } " the vertices of " span.name { (provenance.reference.path) } }
             None => "The vertices",
         }
-        " are " (format!("{:.3} m", d.rms_m)) " from where they were (RMS), none further than " (format!("{:.3} m", d.max_m))
-        @if is_kept(comparison) { ", and nothing overlaps, crosses or is invalid that was not before." }
+        " are " (format!("{:.3} m", d.rms_m)) " from where they were (RMS), the furthest " (format!("{:.3} m", d.max_m))
+        @if is_kept(comparison) {
+            ", and nothing overlaps, crosses or is invalid that was not before"
+            @if comparison.overlaps.new_slivers > 0 { ", but for " (count(comparison.overlaps.new_slivers)) " slivers within the grid" }
+            "."
+        }
         @else { ", and the topology changed in " (changes(comparison)) "." }
     }
 }

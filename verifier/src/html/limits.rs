@@ -32,17 +32,29 @@ const STANDARD_ERRORS: f64 = 5.0;
 
 fn weaknesses(report: &Report) -> Vec<String> {
     let mut found = seen(report);
-    found.extend(
-        [
+    let has_odds = report.p_value_log10.is_some();
+    let common = [
+        (
+            has_odds,
             "The probability is that of such a fit without the mark. It is not the probability that the recipient is \
              innocent: that also depends on who else had the copy, and on everything else that is known.",
+        ),
+        (
+            report.shows_mark(),
             "Whoever held the key and the reference could have made this mark. If they could have, and nothing was deposited \
              before the copy was handed out, the finding says only that the map was marked with this key.",
+        ),
+        (
+            has_odds,
             "If other keys, references, records or options were tried before, and are not counted here, the probability is \
              to be multiplied by how many they were.",
-        ]
-        .map(String::from),
-    );
+        ),
+        (
+            report.verdict == Verdict::Inconclusive,
+            "A larger or less worn piece of the map, another record or another key may give another answer.",
+        ),
+    ];
+    found.extend(common.into_iter().filter(|(holds, _)| *holds).map(|(_, text)| text.into()));
     if report.verdict == Verdict::NoMatch {
         found.push(
             "Another key, another reference or other options than those above may have been used: the finding is about this \
@@ -74,13 +86,19 @@ fn seen(report: &Report) -> Vec<String> {
         }
     }
     if let Some(errors) = report.bit_errors.filter(|errors| *errors > 0 && report.verdict == Verdict::Match) {
-        found.push(format!("{errors} bits of the message were read wrong, so the mark is worn."));
+        let bits = if errors == 1 {
+            "1 bit of the message was"
+        } else {
+            &format!("{errors} bits of the message were")
+        };
+        found.push(format!("{bits} read wrong, so the mark is worn."));
     }
     if let Some(evidence) = &report.evidence {
         let against = evidence.patch_scores.iter().flatten().filter(|score| **score < -3.0).count();
         if against > 0 {
+            let patches = if against == 1 { "1 patch speaks" } else { &format!("{against} patches speak") };
             found.push(format!(
-                "{against} patches speak clearly against the mark (3 standard deviations or more): parts of the suspect may \
+                "{patches} clearly against the mark (3 standard deviations or more): parts of the suspect may \
                  come from elsewhere."
             ));
         }

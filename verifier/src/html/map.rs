@@ -5,7 +5,7 @@ use super::{
     frame::{Frame, largest_below, metres},
     section,
 };
-use crate::{evidence::Evidence, report::Report, sketch::PatchPlace};
+use crate::{decision::Verdict, evidence::Evidence, report::Report, sketch::PatchPlace};
 use maud::{Markup, html};
 use std::fmt::Write as _;
 
@@ -26,7 +26,7 @@ pub fn evidence(report: &Report) -> Markup {
     let frame = Frame::new(&evidence.sketch.extent);
     let content = html! {
         (patterns())
-        (patches(evidence, &frame))
+        (patches(report, evidence, &frame))
         (vertices(report, evidence, &frame))
     };
     section("Where on the map the evidence is", &content)
@@ -57,7 +57,7 @@ fn class(score: Option<f64>) -> &'static str {
     score.map_or("unseen", of)
 }
 
-fn patches(evidence: &Evidence, frame: &Frame) -> Markup {
+fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     let places = &evidence.sketch.patches;
     let score = |patch: usize| evidence.patch_scores.get(patch).copied().flatten();
     let scored = !evidence.patch_scores.is_empty();
@@ -81,10 +81,15 @@ fn patches(evidence: &Evidence, frame: &Frame) -> Markup {
     let caption = html! {
         b { "Evidence by patch. " }
         @if scored {
-            "The mark is in " (count(places.len())) " patches, each with its own secret pattern. The numbers say \
+            @if report.verdict == Verdict::Match { "The mark is in " } @else { "A mark would be in " }
+            (count(places.len())) " patches, each with its own secret pattern. The numbers say \
              how many standard deviations each of them by itself is above what a wrong key would show; a wrong key gives \
-             values around 0, hardly one above 3. " (count(seen.iter().filter(|s| **s >= 2.0).count())) " of the " (count(seen.len()))
-            " patches that were seen reach 2 by themselves."
+             values around 0, hardly one above 3. "
+            @if seen.is_empty() { "In none of them did anything move." }
+            @else {
+                (count(seen.iter().filter(|s| **s >= 2.0).count())) " of the " (count(seen.len()))
+                " patches that were seen reach 2 by themselves."
+            }
             (legend(evidence))
         } @else {
             "The reference and its " (count(places.len())) " patches. No patch has a score: nothing was demodulated, or no \

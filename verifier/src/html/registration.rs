@@ -1,7 +1,7 @@
 //! How the suspect was brought onto the reference, and what was left.
 
 use super::{chart::Chart, count, figure, section, sentence, table};
-use crate::{evidence::Evidence, explain, report::Report};
+use crate::{decision::Verdict, evidence::Evidence, explain, report::Report};
 use maud::{Markup, html};
 
 pub fn registration(report: &Report) -> Markup {
@@ -11,12 +11,18 @@ pub fn registration(report: &Report) -> Markup {
         "landmarks" => "by features with the same attribute values",
         _ => "by features of the same shape",
     };
-    let alignment = report.evidence.as_ref().map(|e| &e.sketch.alignment);
+    let is_found = report.message.is_some();
+    let alignment = report.evidence.as_ref().filter(|_| is_found).map(|e| &e.sketch.alignment);
     let content = html! {
         p {
             @for text in explain::assumed(report) { (sentence(&text)) }
-            "The suspect was brought onto the reference " (method) ", without the key. What is left between matched vertices \
-             is the mark, and whatever else moved them."
+            @if is_found {
+                "The suspect was brought onto the reference " (method) ", without the key. What is left between matched vertices is "
+                @if report.verdict == Verdict::Match { "the mark, and whatever else moved them." }
+                @else { "whatever moved them, be it a mark or not." }
+            } @else {
+                "Too few of its vertices were found on the reference to compare the two."
+            }
         }
         (table(&[
             ("Landmarks", (r.landmarks > 0).then(|| html! { (count(r.landmarks)) " agree" })),

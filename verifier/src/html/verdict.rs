@@ -18,7 +18,10 @@ pub fn verdict(report: &Report) -> Markup {
             p.answer { (name(report.verdict)) }
             h1 { (sentence(report)) }
             @if report.verdict != Verdict::Match && report.shows_key() {
-                p { "Some mark of this key is in the map, of another message or made with other options." }
+                @match report.verdict {
+                    Verdict::NoMatch => p { "Some mark of this key is in the map, of another message or made with other options." }
+                    _ => p { "Some mark of this key is in the map, whatever its message." }
+                }
             }
             (figures(report))
         }
@@ -49,6 +52,9 @@ fn sentence(report: &Report) -> Markup {
                 " does not carry the mark of " (mark(report)) ", which would have shown"
                 @if let Some(odds) = odds { ": by chance, " (chance) " " (odds) } "."
             }
+            (Verdict::Inconclusive, _) if report.parameters.expected_message.is_none() => {
+                " was not compared with any copy: " (printable(&report.reason)) "."
+            }
             (Verdict::Inconclusive, odds) => {
                 " cannot tell whether it carries the mark of " (mark(report)) ": " (printable(&report.reason))
                 @match odds {
@@ -69,7 +75,7 @@ fn mark(report: &Report) -> Markup {
             (Some(several), ..) if several > 1 && report.verdict == Verdict::Match => {
                 (count(several)) " of the copies that were tried"
             }
-            (Some(several), ..) if report.verdict != Verdict::Match => {
+            (Some(several), ..) if several > 1 => {
                 "any of the " (count(several)) " copies that were tried"
             }
             (_, Some(recipient), _) => { "the copy made for “" span.name { (printable(recipient)) } "”" }
