@@ -108,7 +108,10 @@ impl Record {
     /// # Errors
     /// [`Error::Record`] says what is wrong with it.
     pub fn from_json(text: &str) -> Result<Self> {
-        let record: Record = serde_json::from_str(text).map_err(|error| Error::Record(error.to_string()))?;
+        let record: Record = serde_json::from_str(text).map_err(|error| {
+            // serde goes on with the list of all fields there are.
+            Error::Record(error.to_string().split(", expected one of").next().unwrap_or_default().into())
+        })?;
         if record.meshmark_record != VERSION {
             let found = record.meshmark_record;
             return Err(Error::Record(format!("version {found} instead of {VERSION}")));

@@ -99,7 +99,7 @@ struct Outcome {
 }
 
 /// Verifies one suspect against every record (*.json) of a folder. `request` says how; what it says of the mark
-/// is taken from the records. `warn` is told of every file that is skipped, and why.
+/// is taken from the records. `warn` is told which files are skipped, and why.
 ///
 /// # Errors
 /// As [`crate::verify()`], and when no record is usable.
@@ -109,10 +109,10 @@ pub fn verify_candidates(
     progress: &mut Progress,
     warn: &mut dyn FnMut(&str),
 ) -> Result<Report> {
-    let mut skipped = 0;
-    let mut skip = |file: &str, reason: String| {
-        skipped += 1;
-        warn(&format!("{} is skipped: {reason}", folder.join(file).display()));
+    let mut skipped: Vec<(String, Vec<String>)> = Vec::new();
+    let mut skip = |file: &str, reason: String| match skipped.iter_mut().find(|(r, _)| *r == reason) {
+        Some((_, files)) => files.push(file.into()),
+        None => skipped.push((reason, vec![file.into()])),
     };
     let groups = groups(request, read_all(folder, &request.key, &mut skip)?)?;
     let mut examined: Vec<(Request, Examination)> = Vec::new();
@@ -121,6 +121,10 @@ pub fn verify_candidates(
         let Some((group, seen)) = examine_group(group, progress, &mut skip)? else { continue };
         of_group.push(group.candidates);
         examined.push((group.request, seen));
+    }
+    let left_out = skipped.iter().map(|(_, files)| files.len()).sum();
+    for (reason, files) in &skipped {
+        warn(&format!("{} skipped: {reason}", folder.join(these_are(files)).display()));
     }
     let outcomes = decide_all(of_group, &examined, request.significance);
     let Some(best) = outcomes.first() else {
@@ -137,7 +141,17 @@ pub fn verify_candidates(
         ..template.clone()
     };
     let report = Report::new(&chosen, seen, overall(&outcomes), progress.finish());
-    Ok(Report { candidates: Some(listed(&outcomes, skipped)), ..report })
+    Ok(Report { candidates: Some(listed(&outcomes, left_out)), ..report })
+}
+
+/// "a.json is", "a.json, b.json and 31 more are".
+fn these_are(files: &[String]) -> String {
+    match files {
+        [file] => format!("{file} is"),
+        [first, second] => format!("{first} and {second} are"),
+        [first, second, more @ ..] => format!("{first}, {second} and {} more are", more.len()),
+        [] => unreachable!("a reason is that of a file"),
+    }
 }
 
 /// Reads what can be read, in the order of file names.

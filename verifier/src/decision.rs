@@ -79,11 +79,18 @@ pub fn decide_among(found: &Demodulation, message: &Message, tried: usize, signi
     let bits = message.len();
     let p_mark = survival::normal_log10(found.mark_score(message));
     // A message of m bits cannot be hit less often than once in 2^m.
-    let p_recipient =
-        survival::normal_log10(found.recipient_score(message)).max(-(bits as f64) * 2f64.log10());
+    let least = -(bits as f64) * 2f64.log10();
+    let p_recipient = survival::normal_log10(found.recipient_score(message)).max(least);
     let (verdict, reason) = if bits < LEAST_IDENTIFYING_BITS {
         let reason = format!(
             "a message of {bits} bits cannot identify anyone: mark with {LEAST_IDENTIFYING_BITS} or more"
+        );
+        (Verdict::Inconclusive, reason)
+    } else if least >= each.log10() {
+        let among = if tried > 1 { format!(" for each of {tried} records") } else { String::new() };
+        let reason = format!(
+            "a message of {bits} bits, read without an error, agrees by chance once in 2^{bits} times, and a \
+             significance of {each:.1e}{among} asks for less: give a larger one, or mark with more bits"
         );
         (Verdict::Inconclusive, reason)
     } else if p_mark.max(p_recipient) < each.log10() {
@@ -154,6 +161,24 @@ mod tests {
         let found = evidence(message.signs(), message.signs().iter().map(|b| 1e4 * b).collect());
         assert_eq!(decide(&found, Some(&message), 0.1).verdict, Verdict::Inconclusive);
         assert_eq!(decide(&found, None, 1e-6).verdict, Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_significance_that_no_message_of_these_bits_reaches_is_inconclusive_and_says_so() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let found = evidence(message.signs(), message.signs().iter().map(|b| 40.0 * b).collect());
+        let asked = decide(&found, Some(&message), 1e-60);
+        assert_eq!(asked.verdict, Verdict::Inconclusive);
+        assert!(
+            asked.reason.contains("once in 2^128") && asked.reason.contains("1.0e-60"),
+            "{}",
+            asked.reason
+        );
+        let short = Message::from_hex("0a1b2c").unwrap();
+        let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
+        assert_eq!(decide_among(&found, &short, 1, 1e-6).verdict, Verdict::Match);
+        let among = decide_among(&found, &short, 17, 1e-6);
+        assert!(among.reason.contains("for each of 17 records"), "{}", among.reason);
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! What `--explain` prints: the report in sentences, for one who must rely on it.
 
 use crate::{
+    decision::Verdict,
     inputs::{Digested, Inputs},
-    report::{Report, power_of_ten, printable},
+    report::{Report, clipped, power_of_ten},
 };
 use std::fmt::Write as _;
 
@@ -160,12 +161,15 @@ pub(crate) fn probabilities(report: &Report) -> Vec<String> {
 
 /// What the message says of a person.
 pub(crate) fn bound(report: &Report) -> Vec<String> {
+    if report.candidates.is_some() && report.verdict != Verdict::Match {
+        return Vec::new(); // of many copies none
+    }
     let p = &report.parameters;
     let sentence = match (&p.recipient, &p.expected_message) {
         (Some(recipient), Some(message)) => format!(
             "The message {message} was computed again from the key and the recipient \"{}\": it is a keyed hash of \
-             the two and cannot be chosen.",
-            printable(recipient)
+             the two, and without the key nobody can choose it.",
+            clipped(recipient)
         ),
         (None, Some(message)) => format!(
             "The message {message} was given as bare bits: nothing in it names a recipient, and who received it must be \

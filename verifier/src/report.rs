@@ -301,6 +301,18 @@ pub fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() || turns(c) { '\u{fffd}' } else { c }).collect()
 }
 
+/// A longer name fills pages.
+const LONGEST_NAME: usize = 200;
+
+/// The same of a name, cut short when it fills pages; the JSON has all of it.
+pub(crate) fn clipped(name: &str) -> String {
+    let printable = printable(name);
+    match printable.char_indices().nth(LONGEST_NAME) {
+        None => printable,
+        Some((end, _)) => format!("{}… ({} characters)", &printable[..end], name.chars().count()),
+    }
+}
+
 /// How sure the bits are, from their log-likelihood ratios.
 pub(crate) fn certainty(bits: &[f64]) -> String {
     let mut sure: Vec<f64> = bits.iter().map(|llr| llr.abs()).collect();

@@ -212,10 +212,13 @@ fn positive(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+/// Above this a match would be nothing to tell a court of.
+const LARGEST_SIGNIFICANCE: f64 = 1e-3;
+
 fn probability(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
-        _ => Err("give a number between 0 and 1".into()),
+        Ok(value) if value > 0.0 && value <= LARGEST_SIGNIFICANCE => Ok(value),
+        _ => Err(format!("give a number greater than 0 and at most {LARGEST_SIGNIFICANCE}")),
     }
 }
 

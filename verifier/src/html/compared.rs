@@ -3,10 +3,11 @@
 use super::{count, section, table, words};
 use crate::{
     candidates::Candidates,
+    decision::Verdict,
     evidence::Provenance,
     explain,
     inputs::Digested,
-    report::{Report, printable},
+    report::{Report, clipped, printable},
 };
 use maud::{Markup, html};
 
@@ -32,8 +33,15 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
         ("Reference", Some(file(&inputs.reference, &map(v.reference, reference_crs)))),
         ("Key", Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } }))),
         ("Record", Some(record(report, inputs.record.as_ref()))),
-        ("Recipient", report.parameters.recipient.as_ref().map(|r| html! { b { (printable(r)) } })),
+        ("Recipient", recipient(report)),
     ])
+}
+
+/// Of the records that were tried, one is named only when it matches.
+fn recipient(report: &Report) -> Option<Markup> {
+    let is_named = report.candidates.is_none() || report.verdict == Verdict::Match;
+    let recipient = report.parameters.recipient.as_ref().filter(|_| is_named)?;
+    Some(html! { b { (clipped(recipient)) } })
 }
 
 fn file(file: &Digested, about: &Markup) -> Markup {
@@ -44,7 +52,12 @@ fn record(report: &Report, record: Option<&Digested>) -> Markup {
     html! {
         @match (record, &report.candidates) {
             (Some(record), None) => (file(record, &html! { "of this key and this reference" })),
-            (Some(record), Some(_)) => (file(record, &html! { "the best of those that were tried" })),
+            (Some(record), Some(_)) if report.verdict == Verdict::Match => {
+                (file(record, &html! { "the best of those that were tried" }))
+            },
+            (Some(record), Some(_)) => {
+                (file(record, &html! { "one of those that were tried, none of which matches; the settings below are its own" }))
+            },
             (None, _) => "none: how the map was marked was taken from the command line",
         }
     }
@@ -113,7 +126,7 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                 @for (number, entry) in candidates.list.iter().enumerate() {
                     tr {
                         td { @match &entry.recipient {
-                            Some(recipient) => (printable(recipient)),
+                            Some(recipient) => (clipped(recipient)),
                             None => code { (entry.message) },
                         } }
                         td { (printable(&entry.record)) }

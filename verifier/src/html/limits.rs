@@ -40,6 +40,11 @@ fn weaknesses(report: &Report) -> Vec<String> {
              innocent: that also depends on who else had the copy, and on everything else that is known.",
         ),
         (
+            has_odds,
+            "For the key, the probability is that of the normal distribution; the exact one is at most 3.18 times as large, \
+             whatever the map (Bentkus and Dzindzalieta 2015).",
+        ),
+        (
             report.shows_mark(),
             "Whoever held the key and the reference could have made this mark. If they could have, and nothing was deposited \
              before the copy was handed out, the finding says only that the map was marked with this key.",

@@ -3,7 +3,7 @@
 use super::{count, words};
 use crate::{
     decision::Verdict,
-    report::{Report, printable},
+    report::{Report, clipped, printable},
 };
 use maud::{Markup, html};
 
@@ -78,7 +78,7 @@ fn mark(report: &Report) -> Markup {
             (Some(several), ..) if several > 1 => {
                 "any of the " (count(several)) " copies that were tried"
             }
-            (_, Some(recipient), _) => { "the copy made for “" span.name { (printable(recipient)) } "”" }
+            (_, Some(recipient), _) => { "the copy made for “" span.name { (clipped(recipient)) } "”" }
             (_, None, Some(message)) => { "the copy with the message " code { (message) } }
             _ => { "key " code { (p.key_id) } }
         }
