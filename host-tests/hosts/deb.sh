@@ -23,6 +23,15 @@ in_root "$clean" "the documents" "zcat /usr/share/man/man1/meshmark-verify.1.gz 
     source /usr/share/bash-completion/completions/meshmark && complete -p meshmark &&
     test -s /usr/share/doc/meshmark/copyright && test -s /usr/share/zsh/vendor-completions/_meshmark"
 passed "man pages and completions are there"
+in_root "$clean" "the links of the documents" "cd /usr/share/doc/meshmark && find . -name '*.md' | while read -r page; do
+        { grep -o '](\([^)#]*\)' \$page || true; } | sed 's/^](//' | while read -r link; do
+            case \$link in '' | http*) continue ;; esac
+            test -e \$(dirname \$page)/\$link || { echo \$page: \$link; exit 1; }
+        done
+    done"
+in_root "$clean" "docs/verifier.md's example" "cd /usr/share/doc/meshmark/fixtures &&
+    meshmark verify --key vectors/key.json --reference kotka.gpkg --record vectors/record.json vectors/marked.gpkg --report /root/match.html"
+passed "the documents lead somewhere, and their example is a match"
 in_root "$clean" "removing the package" "cp /var/lib/dpkg/info/meshmark.list list && apt-get purge -y -q meshmark && ! ogrinfo --formats | grep MESHMARK &&
     while read -r path; do test -d \"\$path\" || ! test -e \"\$path\" || exit 1; done <list && ! test -e /usr/share/doc/meshmark"
 passed "removal leaves nothing"
