@@ -19,7 +19,7 @@ new_root() {
 mounts=()
 in_root() {
     local folder=$1 what=$2 command=$3 mount from to begin=$EPOCHREALTIME
-    local mount_all="mount -t proc proc '$folder/proc'"
+    local mount_all="mount -t proc proc '$folder/proc' && mount -t tmpfs tmpfs '$folder/dev/shm'"
     for mount in "${mounts[@]}" "/etc/ssl/certs /opt/certs"; do
         read -r from to <<<"$mount"
         mount_all+=" && mkdir -p '$folder$to' && mount --bind '$from' '$folder$to'"
@@ -27,6 +27,6 @@ in_root() {
     "${as_root[@]}" unshare --mount bash -c "$mount_all && exec chroot '$folder' /usr/bin/env -i HOME=/root \
         PATH=/opt/rust/bin:/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
         CARGO_HTTP_CAINFO=/opt/certs/ca-certificates.crt bash -ec \"\$1\"" \
-        bash "cd && $command" >"$work/log" 2>&1 || fail "$what: $(tail -n 30 "$work/log")"
+        bash "cd && $command" >"$work/log" 2>&1 || fail "$what: $(tail -n 100 "$work/log")"
     seconds=$(awk "BEGIN { printf \"%.0f\", $EPOCHREALTIME - $begin }")
 }

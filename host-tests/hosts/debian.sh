@@ -21,8 +21,8 @@ here "git and make" "apt-get update -q && apt-get install -y -q --no-install-rec
 here "make build" "make -s build BUILD=target/$suite/release"
 here "GDAL" "ogr2ogr --version"
 gdal=$(tail -n 1 "$work/log")
-here "the tests" "cargo test --release --locked --no-fail-fast -p meshmark-dataset -p meshmark-plugin -p meshmark-verifier \
-    -p meshmark-host-tests"
+here "the tests" "set -o pipefail && cargo test --release --locked --no-fail-fast -p meshmark-dataset -p meshmark-plugin \
+    -p meshmark-verifier -p meshmark-host-tests 2>&1 | grep -vE '^test .* ok\$'"
 passed "$(awk '/^test result: ok/ { n += $4 } END { print n }' "$work/log") tests with $gdal"
 here "the QGIS plugin" "host-tests/hosts/qgis_plugin.sh"
 grep '^passed' "$work/log"

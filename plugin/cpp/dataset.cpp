@@ -70,7 +70,7 @@ char **MeshmarkDataset::GetFileList()
     return m_source ? m_source->GetFileList() : nullptr;
 }
 
-char **MeshmarkDataset::GetMetadata(const char *domain)
+MeshmarkTexts MeshmarkDataset::GetMetadata(const char *domain)
 {
     return m_source ? m_source->GetMetadata(domain) : nullptr;
 }

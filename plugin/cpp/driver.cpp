@@ -61,7 +61,7 @@ static GDALDataset *Open(GDALOpenInfo *info)
     }
 }
 
-static GDALDataset *Create(const char *name, int, int, int bands, GDALDataType, char **options)
+static GDALDataset *Create(const char *name, int, int, int bands, GDALDataType, MeshmarkTexts options)
 {
     if (!HasPrefix(name))
     {

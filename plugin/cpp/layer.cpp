@@ -29,7 +29,7 @@ static bool IsNativeData(const char *domain)
     return domain && EQUAL(domain, NATIVE_DATA);
 }
 
-char **MeshmarkLayer::GetMetadata(const char *domain)
+MeshmarkTexts MeshmarkLayer::GetMetadata(const char *domain)
 {
     return IsNativeData(domain) ? nullptr : m_source.GetMetadata(domain);
 }
@@ -179,6 +179,15 @@ void MeshmarkLayer::SetSpatialFilter(int field, OGRGeometry *geometry)
 }
 #endif
 
+// As hosts do: with a number, GDAL 3.10 complains of tables without geometry.
+static void SetFilter(OGRLayer &source, int field, OGRGeometry *geometry)
+{
+    if (field == 0)
+        source.SetSpatialFilter(geometry);
+    else
+        source.SetSpatialFilter(field, geometry);
+}
+
 // A straight edge moves no further than its ends do, so a source's rectangle that is wider by the
 // furthest move loses no feature; PassesFilters then decides. Arcs may move further than their points.
 void MeshmarkLayer::ApplySpatialFilterToSource()
@@ -186,9 +195,9 @@ void MeshmarkLayer::ApplySpatialFilterToSource()
     ApplyIgnoredFieldsToSource();
     const int field = m_iGeomFieldFilter;
     if (!m_marked || !m_poFilterGeom)
-        m_source.SetSpatialFilter(field, m_poFilterGeom);
+        SetFilter(m_source, field, m_poFilterGeom);
     else if (!HasStraightEdges(field))
-        m_source.SetSpatialFilter(field, nullptr);
+        SetFilter(m_source, field, nullptr);
     else
     {
         double x, y;
@@ -339,7 +348,7 @@ bool MeshmarkLayer::MeasureExtents()
     std::vector<OGREnvelope> extents(fields);
     m_source.SetIgnoredFields(nullptr);
     m_source.SetAttributeFilter(nullptr);
-    m_source.SetSpatialFilter(m_iGeomFieldFilter, nullptr);
+    SetFilter(m_source, m_iGeomFieldFilter, nullptr);
     ResetReading();
     CPLErrorReset();
     while (auto feature = ReadNext())

@@ -25,7 +25,13 @@ MeshmarkOutputDataset::~MeshmarkOutputDataset()
     Finish();
 }
 
-#if MESHMARK_GDAL_AT_LEAST(7)
+#if MESHMARK_GDAL_AT_LEAST(13)
+CPLErr MeshmarkOutputDataset::Close(GDALProgressFunc progress, void *of_progress)
+{
+    const bool finished = Finish();
+    return GDALDataset::Close(progress, of_progress) == CE_None && finished ? CE_None : CE_Failure;
+}
+#elif MESHMARK_GDAL_AT_LEAST(7)
 CPLErr MeshmarkOutputDataset::Close()
 {
     const bool finished = Finish();

@@ -11,13 +11,18 @@
 #include <memory>
 #include <vector>
 
-// GDAL 3.12 made the getters const, 3.11 merged the overloads of extents and spatial filters
+// GDAL 3.13 made lists of texts const, 3.12 the getters, 3.11 merged the overloads of extents and spatial filters
 // (RFC 107), 3.9 changed a parameter of SetIgnoredFields.
 #define MESHMARK_GDAL_AT_LEAST(minor) (GDAL_VERSION_NUM >= GDAL_COMPUTE_VERSION(3, minor, 0))
 #if MESHMARK_GDAL_AT_LEAST(12)
 #define MESHMARK_CONST const
 #else
 #define MESHMARK_CONST
+#endif
+#if MESHMARK_GDAL_AT_LEAST(13)
+typedef CSLConstList MeshmarkTexts;
+#else
+typedef char **MeshmarkTexts;
 #endif
 #if MESHMARK_GDAL_AT_LEAST(9)
 typedef CSLConstList MeshmarkFieldNames;
@@ -121,7 +126,7 @@ class MeshmarkLayer final : public OGRLayer
     OGRErr GetExtent(int field, OGREnvelope *extent, int force) override;
 #endif
 
-    char **GetMetadata(const char *domain) override;
+    MeshmarkTexts GetMetadata(const char *domain) override;
     char **GetMetadataDomainList() override;
     const char *GetMetadataItem(const char *name, const char *domain) override;
 
@@ -184,7 +189,7 @@ class MeshmarkDataset final : public GDALDataset
     const GDALRelationship *GetRelationship(const std::string &name) const override;
     OGRStyleTable *GetStyleTable() override;
     char **GetFileList() override;
-    char **GetMetadata(const char *domain) override;
+    MeshmarkTexts GetMetadata(const char *domain) override;
     char **GetMetadataDomainList() override;
     const char *GetMetadataItem(const char *name, const char *domain) override;
 
@@ -254,7 +259,9 @@ class MeshmarkOutputDataset final : public GDALDataset
     const OGRFieldDomain *GetFieldDomain(const std::string &name) const override;
     bool AddFieldDomain(std::unique_ptr<OGRFieldDomain> &&domain, std::string &reason) override;
 
-#if MESHMARK_GDAL_AT_LEAST(7)
+#if MESHMARK_GDAL_AT_LEAST(13)
+    CPLErr Close(GDALProgressFunc progress = nullptr, void *of_progress = nullptr) override;
+#elif MESHMARK_GDAL_AT_LEAST(7)
     CPLErr Close() override;
 #endif
     // For a call that writes. GDAL's last failure after it is one that came after it: Finish looks for that.
