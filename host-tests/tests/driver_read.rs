@@ -351,7 +351,9 @@ fn a_spatial_filter_reads_what_it_reads_of_the_marked_map() {
             let spat = [&["-spat"], &rectangle[..]].concat();
             let (view, file) = (format!("view{number}_{name}"), format!("file{number}_{name}"));
             let of_view = host.mark("GPKG", &view, &source(name), &spat);
-            let of_file = host.run("ogr2ogr", &[&["-f", "GPKG", &file, &marked], &spat[..]].concat());
+            // By Arrow, GDAL 3.10 reads all of a table without geometry, and nothing of it otherwise.
+            let arguments = [&["-f", "GPKG", &file, &marked], &spat[..]].concat();
+            let of_file = host.run_with("ogr2ogr", &arguments, &[("OGR2OGR_USE_ARROW_API", "NO")]);
             assert_eq!((of_view.code, of_file.code), (Some(0), Some(0)), "{}", of_view.stderr);
             // GDAL 3.12 has one about a table without geometry.
             assert_eq!(of_view.errors(), of_file.errors());

@@ -138,6 +138,8 @@ fn a_page_without_a_match_claims_no_mark() {
         let text = words(&page(folder.path(), &[&VERIFY[..], &records, &["kotka.gpkg"]].concat()));
         assert!(text.contains("does not carry the mark of the copy made for “ACME GmbH”"), "{text}");
         assert!(text.contains("A mark would be in 7 patches"));
+        assert_eq!(text.contains("none of which matches"), records[0] == "--records");
+        assert_eq!(text.contains("keyed hash"), records[0] == "--record");
         assert!(
             !text.contains("The mark is in")
                 && !text.contains("is the mark,")
