@@ -7,6 +7,8 @@ PLUGIN := $(PLUGINS)/ogr_MESHMARK.so
 PREFIX ?= /usr/local
 # GDAL's own plugin folder, where every program finds the driver without a variable.
 GDAL_PLUGIN_DIR ?= $(shell pkg-config --variable=libdir gdal 2>/dev/null || echo $(PREFIX)/lib)/gdalplugins
+# The crate gdal-sys knows the C interface of GDAL up to 3.12, and that of later ones has all of it.
+WITH_GDAL = $(shell pkg-config --modversion gdal 2>/dev/null | awk -F . '$$2 > 12 { print "GDAL_VERSION=3.12.0" }')
 # What the studies below run on; name your own with MAPS="a.gpkg folder".
 BENCH_MAPS := $(wildcard ../shared/maps/dev/jp_tokyo_nerima.gpkg ../shared/maps/large/kz_astana_city.gpkg \
 	../shared/maps/large/jp_tokyo_adachi_6km.gpkg)
@@ -22,22 +24,22 @@ FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 	uninstall fixtures deps lint
 
 build: deps
-	$(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-plugin -p meshmark-verifier
 	mkdir -p $(PLUGINS)
 	install -m 755 $(BUILD)/libmeshmark_plugin.so $(PLUGIN)
 
 test: build
-	$(CARGO) test --release --locked --workspace
+	$(WITH_GDAL) $(CARGO) test --release --locked --workspace
 
 demo: build
 	GDAL_DRIVER_PATH=$(CURDIR)/$(PLUGINS) ./demo.sh $(BUILD)/meshmark fixtures/helsinki.gpkg
 
 # About half an hour for the maps of docs/performance.md.
 bench: build $(BENCH_PYTHON)
-	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
 	$(BUILD)/bench --out target/bench --tiles $(BENCH_TILES) --script $(BENCH_PYTHON) host-tests/peers/mesh_spectral.py \
 		$(or $(MAPS),$(BENCH_MAPS),$(FIXTURES))
-	$(CARGO) bench --locked -p meshmark-host-tests --bench kernels
+	$(WITH_GDAL) $(CARGO) bench --locked -p meshmark-host-tests --bench kernels
 
 $(BENCH_PYTHON): host-tests/peers/requirements.txt
 	./install-deps.sh python3-venv libopenblas-dev
@@ -47,22 +49,22 @@ $(BENCH_PYTHON): host-tests/peers/requirements.txt
 
 # The paper's Table 2 and more, on maps in metres; about an hour for the nine maps of docs/evaluation.md.
 table2: build
-	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
 	$(BUILD)/table2 --out target/table2 $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # What marking does to shape and topology, with every SHAPE and BASIS; fails when anything became invalid.
 quality: build
-	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
 	$(BUILD)/quality $(or $(MAPS),$(wildcard ../shared/maps/dev/*.gpkg ../shared/maps/variety/*.gpkg),$(FIXTURES))
 
 # p-values of wrong keys and wrong recipients.
 false-alarms: build
-	$(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
 	$(BUILD)/false_alarms --out target/false_alarms $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # Kills and full disks while marked maps are written, more of them than in the tests.
 faults: build
-	$(CARGO) build --release --locked -p meshmark-host-tests --bin faults
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bin faults
 	$(BUILD)/faults
 
 conformance: build
@@ -120,7 +122,7 @@ uninstall:
 
 lint: deps
 	$(CARGO) fmt --all -- --check
-	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
+	$(WITH_GDAL) $(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
 deps:
 	@./install-deps.sh
