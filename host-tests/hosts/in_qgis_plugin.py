@@ -129,9 +129,13 @@ def verify_what_a_layer_shows():
             "SUSPECT": suspect,
             "KEY": f"{HERE}/key.json",
             "RECORD": f"{HERE}/records/filtered.json",
+            "REPORT": f"{HERE}/half.html",
             "OPEN_REPORT": False,
         },
     )
+    assert count(f"{HERE}/half.suspect.gpkg") == suspect.featureCount() > 0, "the report names a file that is gone"
+    with open(f"{HERE}/half.html", encoding="utf-8") as page:
+        assert f"{HERE}/half.suspect.gpkg" in page.read()
     assert found["VERDICT"] == "match" and found["RECIPIENT"] == "ACME GmbH", found
     print("passed: qgis_plugin: the half of a map that a layer shows verifies", flush=True)
 
@@ -171,20 +175,30 @@ def no_layers():
                 raise AssertionError(f"no error that says {why}")
 
 
-def both_files_or_none():
-    """The report cannot be written once the evidence map has its name."""
+def verification_fails(what, why, evidence, report, feedback=None):
+    """Of a suspect that is a filtered layer: the copy of what it shows goes, too."""
     import processing
 
-    given = {"REFERENCE": f"{HERE}/records/filtered.reference.gpkg", "SUSPECT": f"{HERE}/filtered.gpkg"}
+    suspect = of_map("buildings", "filtered.gpkg")
+    assert suspect.setSubsetString("fid % 2 = 0")
+    given = {"REFERENCE": f"{HERE}/records/filtered.reference.gpkg", "SUSPECT": suspect}
     places = {"KEY": f"{HERE}/key.json", "RECORD": f"{HERE}/records/filtered.json"}
-    with folder.unchanged("qgis_plugin: a report that fails takes the evidence map back"):
+    files = {"EVIDENCE_MAP": f"{HERE}/{evidence}", "REPORT": f"{HERE}/{report}"}
+    with folder.unchanged(f"qgis_plugin: {what}"):
         try:
-            one = {"EVIDENCE_MAP": f"{HERE}/one.html", "REPORT": f"{HERE}/one.html"}
-            processing.run("meshmark:verify", {**given, **places, **one})
+            processing.run("meshmark:verify", {**given, **places, **files}, feedback=feedback)
         except QgsProcessingException as error:
-            assert "one.html cannot be written" in str(error), error
+            assert why in str(error), error
         else:
-            raise AssertionError("one file for two is not refused")
+            raise AssertionError(f"no error that says {why}")
+
+
+def both_files_or_none():
+    """The report cannot be written once the evidence map has its name."""
+    taken_back = "a report that fails takes the evidence map back"
+    verification_fails(taken_back, "one.html cannot be written", "one.html", "one.html")
+    cancelling = Cancelling("Verifying", 0.2)
+    verification_fails("a verification that is cancelled", "Cancelled", "new.gpkg", "new.html", cancelling)
 
 
 def no_command(name, content):

@@ -97,19 +97,29 @@ class Algorithm(QgsProcessingAlgorithm):
         return layers.file_of(layer) or layers.Snapshot(layer)
 
 
-def file_of_map(given, folder, name, context, feedback):
-    """The path of what `map_layer` gave; a Snapshot is copied into `folder` first."""
-    if isinstance(given, str):
-        return given
-    path = os.path.join(folder, f"{name}.gpkg")
-    feedback.pushWarning(
-        tr(
-            "{} is no file, or is filtered or edited: a copy of what it shows is compared, and deleted afterwards. For a"
-            " report that others can repeat, save the layer to a file and choose that."
-        ).format(given.name)
-    )
-    layers.copy([given], path, context, feedback)
-    return path
+class Inputs:
+    """The maps of a run as files. What a layer only shows is copied: beside the report, which names it, or into a folder that
+    goes with the run."""
+
+    def __init__(self, report, staging):
+        self._base = os.path.splitext(report)[0] + "." if report else os.path.join(staging, "")
+        self._is_kept = bool(report)
+
+    def place(self, given, name):
+        """Where the copy of what `map_layer` gave goes; None of a file."""
+        return None if isinstance(given, str) else f"{self._base}{name}.gpkg"
+
+    def path(self, given, name, context, feedback):
+        """The path of what `map_layer` gave, a Snapshot copied."""
+        place = self.place(given, name)
+        if place is None:
+            return given
+        if os.path.lexists(place):
+            raise QgsProcessingException(tr("{} exists: choose another name for the report.").format(place))
+        layers.copy([given], place, context, feedback)
+        if self._is_kept:
+            feedback.pushInfo(tr("What {} shows is kept beside the report: {}").format(given.name, place))
+        return place
 
 
 def sentences(errors):

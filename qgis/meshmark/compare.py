@@ -11,7 +11,7 @@ from qgis.core import (
 )
 
 from . import commands, reports
-from .algorithm import Algorithm, file_of_map
+from .algorithm import Algorithm, Inputs
 from .text import tr
 from .verify import answer
 
@@ -66,15 +66,17 @@ class Compare(Algorithm):
     def process(self, given, context, feedback):
         self._report = reports.Report(self, given, context, feedback)
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
+            inputs = Inputs(self._report.path, staging)
+            copies = [inputs.place(self._original, "original"), inputs.place(self._marked, "marked")]
             arguments = [commands.meshmark(), "compare", "--json", *self._report.options()]
             names = self.parameterAsString(given, "LAYERS", context)
             arguments += ["--layers", names] if names else []
             if given.get("PRECISION") is not None:
                 arguments += ["--precision", repr(self.parameterAsDouble(given, "PRECISION", context))]
-            arguments += ["--", file_of_map(self._original, staging, "original", context, feedback)]
-            arguments += [file_of_map(self._marked, staging, "marked", context, feedback)]
-            feedback.setProgressText(tr("Comparing"))
-            with commands.all_or_nothing([self._report.path]):
+            with commands.all_or_nothing([self._report.path, *copies]):
+                arguments += ["--", inputs.path(self._original, "original", context, feedback)]
+                arguments += [inputs.path(self._marked, "marked", context, feedback)]
+                feedback.setProgressText(tr("Comparing"))
                 found = answer(commands.run(arguments, feedback), (0,), feedback)
         results = {name: found[section][figure] for name, _, (section, figure) in figures()}
         for name, label, _ in figures():

@@ -16,7 +16,7 @@ from qgis.core import (
 )
 
 from . import commands, reports, settings, styles
-from .algorithm import Algorithm, file_of_map, sentences
+from .algorithm import Algorithm, Inputs, sentences
 from .text import tr
 
 # Exit codes with which the command gives a verdict: match, no match, inconclusive.
@@ -113,13 +113,15 @@ class Verify(Algorithm):
         evidence = self.parameterAsFileOutput(given, "EVIDENCE_MAP", context)
         self._report = reports.Report(self, given, context, feedback)
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
+            inputs = Inputs(self._report.path, staging)
+            copies = [inputs.place(self._reference, "reference"), inputs.place(self._suspect, "suspect")]
             arguments = [commands.meshmark(), "verify", "--json"]
             arguments += ["--key", self.parameterAsString(given, "KEY", context), *self._marks(given, context)]
             arguments += (["--evidence-map", evidence] if evidence else []) + self._report.options()
-            arguments += ["--reference", file_of_map(self._reference, staging, "reference", context, feedback)]
-            arguments += ["--", file_of_map(self._suspect, staging, "suspect", context, feedback)]
-            feedback.setProgressText(tr("Verifying"))
-            with commands.all_or_nothing([evidence, self._report.path]):
+            with commands.all_or_nothing([evidence, self._report.path, *copies]):
+                arguments += ["--reference", inputs.path(self._reference, "reference", context, feedback)]
+                arguments += ["--", inputs.path(self._suspect, "suspect", context, feedback)]
+                feedback.setProgressText(tr("Verifying"))
                 found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
         for line in summary(found):
             feedback.pushInfo(line)
