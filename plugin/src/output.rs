@@ -1,4 +1,4 @@
-//! What ogr2ogr or gdal was told to write to, read from its command line.
+//! What ogr2ogr was told to write to, read from its command line.
 //!
 //! Writers of several files, like that of Shapefiles, append to the files of a folder without asking the
 //! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the
@@ -11,10 +11,10 @@ use crate::{
 };
 use std::path::Path;
 
-/// Options of ogr2ogr and gdal that name another input.
-const INPUT_OPTIONS: [&str; 5] = ["-clipsrc", "-clipdst", "--like", "--input", "-i"];
+/// Options of ogr2ogr that name another input.
+const INPUT_OPTIONS: [&str; 2] = ["-clipsrc", "-clipdst"];
 
-/// Fails when this process is an ogr2ogr or a gdal whose target is the source, or the folder of its files.
+/// Fails when this process is an ogr2ogr whose target is the source, or the folder of its files.
 pub fn check_is_not_source(files: &SourceFiles) -> Result<()> {
     match target(&arguments(), |path| files.contain_or_lie_in(path)) {
         Some(path) => Err(Error::OutputIsSource { path: path.into() }),
@@ -22,7 +22,7 @@ pub fn check_is_not_source(files: &SourceFiles) -> Result<()> {
     }
 }
 
-/// Fails when this process is an ogr2ogr or a gdal whose target is the record.
+/// Fails when this process is an ogr2ogr whose target is the record.
 pub fn check_is_not_record(record: &str) -> Result<()> {
     match target(&arguments(), |path| same_place(path, Path::new(record))) {
         Some(_) => Err(Error::RecordIsOther { path: record.into(), what: "output" }),
@@ -34,31 +34,17 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// The target of ogr2ogr or gdal, if it is one that is asked for. For ogr2ogr it stands before the source, between and before
-/// them stand options and their values; for gdal behind it, or anywhere as `--output`.
+/// The target of ogr2ogr, if it is one that is asked for. It stands before the source; between and before them
+/// stand options and their values.
 fn target(arguments: &[String], is_asked_for: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
-    let program = Path::new(program).file_name()?.to_str()?;
-    let words: Vec<&str> = rest.iter().flat_map(|argument| option_and_value(argument)).collect();
-    let source =
-        words.iter().position(|a| a.get(..9).is_some_and(|p| p.eq_ignore_ascii_case("MESHMARK:")))?;
-    let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&words[at - 1]);
-    let is_output = |at: usize| match program {
-        "ogr2ogr" => at < source,
-        "gdal" => at > source || at > 0 && ["--output", "-o"].contains(&words[at - 1]),
-        _ => false,
-    };
-    let named = |&at: &usize| is_output(at) && !is_input(at) && is_asked_for(Path::new(words[at]));
-    (0..words.len()).find(named).map(|at| words[at])
-}
-
-/// `--output=map` is two words, like `--output map`.
-fn option_and_value(argument: &str) -> impl Iterator<Item = &str> {
-    let (first, second) = match argument.split_once('=').filter(|_| argument.starts_with("--")) {
-        Some((option, value)) => (option, Some(value)),
-        None => (argument, None),
-    };
-    [first].into_iter().chain(second)
+    if Path::new(program).file_name()? != "ogr2ogr" {
+        return None;
+    }
+    let source = rest.iter().position(|a| a.get(..9).is_some_and(|p| p.eq_ignore_ascii_case("MESHMARK:")))?;
+    let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
+    let named = (0..source).find(|&at| !is_input(at) && is_asked_for(Path::new(&rest[at])))?;
+    Some(&rest[named])
 }
 
 #[cfg(test)]
@@ -78,16 +64,5 @@ mod tests {
         assert!(!refused("ogr2ogr -clipsrc map out MESHMARK:map"), "another input");
         assert!(!refused("python3 map MESHMARK:map"), "another program");
         assert!(!refused("ogr2ogr out map"), "without us");
-    }
-
-    #[test]
-    fn only_a_target_of_gdal_that_is_the_source_is_refused() {
-        assert!(refused("gdal vector convert MESHMARK:map map --overwrite --oo KEY=k"));
-        assert!(refused("/usr/bin/gdal vector convert --output=map --input=MESHMARK:map"));
-        assert!(refused("gdal vector pipeline ! read MESHMARK:map --oo KEY=k ! write map"));
-        assert!(!refused("gdal vector convert MESHMARK:map out"));
-        assert!(!refused("gdal vector clip --like map MESHMARK:map out"), "another input");
-        assert!(!refused("gdal vector clip MESHMARK:map out --like=map"), "another input");
-        assert!(!refused("gdal vector convert map out"), "without us");
     }
 }
