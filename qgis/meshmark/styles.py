@@ -86,16 +86,36 @@ def area(colour, opacity):
     return QgsFillSymbol.createSimple(style)
 
 
-class Styler(QgsProcessingLayerPostProcessorInterface):
-    """Gives a layer its look when it is added to the project."""
+def file_of(layer):
+    return layer.source().partition("|")[0]
 
-    def __init__(self, renderer_of):
+
+def show_above(layer):
+    """Moves a layer above those of the same file: where QGIS puts them depends on its version, and on what is selected."""
+    node = layer.project().layerTreeRoot().findLayer(layer.id()) if layer.project() else None
+    if node is None:
+        return
+    group = node.parent()
+    of_file = [other for other in group.findLayers() if other.layer() and file_of(other.layer()) == file_of(layer)]
+    first = min(group.children().index(other) for other in of_file if other.parent() == group)
+    if group.children().index(node) > first:
+        group.insertChildNode(first, node.clone())
+        group.removeChildNode(node)
+
+
+class Styler(QgsProcessingLayerPostProcessorInterface):
+    """Gives a layer its look and its place when it is added to the project."""
+
+    def __init__(self, renderer_of, is_above):
         super().__init__()
         self._renderer_of = renderer_of
+        self._is_above = is_above
 
     def postProcessLayer(self, layer, context, feedback):
         layer.setRenderer(self._renderer_of(layer))
         layer.triggerRepaint()
+        if self._is_above:
+            show_above(layer)
 
 
 # Until its layer is loaded nobody else keeps a post-processor alive; afterwards QGIS deletes it, so every run has its own.
@@ -104,5 +124,6 @@ _STYLERS = {}
 
 def processor(name):
     """A post-processor for the layer of this name."""
-    _STYLERS[name] = Styler({"vertex_displacements": displacements, "patches": patches}[name])
+    is_above = name == "vertex_displacements"
+    _STYLERS[name] = Styler(displacements if is_above else patches, is_above)
     return _STYLERS[name]

@@ -138,15 +138,11 @@ class Verify(Algorithm):
         return {**results, **{name: path for name, path in written.items() if path}}
 
     def _add_layers(self, evidence, context):
-        # From below to above: QGIS 3.36 and later go by the key, earlier ones by the names.
-        for key, (layer, title) in enumerate(
-            [
-                ("patches", tr("Patches")),
-                ("vertex_displacements", tr("Displacements")),
-            ]
-        ):
+        for layer, title in [
+            ("patches", tr("Patches")),
+            ("vertex_displacements", tr("Displacements")),
+        ]:
             details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
-            details.layerSortKey = key
             details.setPostProcessor(styles.processor(layer))
             context.addLayerToLoadOnCompletion(f"{evidence}|layername={layer}", details)
 
