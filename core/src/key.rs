@@ -78,6 +78,18 @@ impl SecretKey {
         Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..RECIPIENT_BITS / 8])
     }
 
+    /// As many key-dependent bits as `half` has, for a round of the whitening of messages of so many bits.
+    pub(crate) fn round_bits(&self, message_bits: usize, round: u8, half: &[bool]) -> Vec<bool> {
+        const BITS: usize = 256; // of one HMAC
+        let half_bytes: Vec<u8> = half.iter().map(|bit| u8::from(*bit)).collect();
+        let block = |number: usize| {
+            let [low, high] = (message_bits as u16).to_le_bytes();
+            let text = [&[low, high, round, number as u8], &half_bytes[..]].concat();
+            Message::from_bytes(&self.derive("whitening", &text)).bits().to_vec()
+        };
+        (0..half.len().div_ceil(BITS)).flat_map(block).take(half.len()).collect()
+    }
+
     /// The seed of the chip streams.
     pub(crate) fn chip_seed(&self) -> [u8; 32] {
         self.derive("chips", b"")

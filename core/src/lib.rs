@@ -65,5 +65,6 @@ pub mod spectrum;
 mod topology;
 mod tridiagonal;
 pub mod vertices;
+mod whitening;
 
 pub use error::{Error, Result};

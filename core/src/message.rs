@@ -33,6 +33,11 @@ impl Message {
         Message { bits }
     }
 
+    /// The message of these bits, a multiple of four.
+    pub(crate) fn from_bits(bits: Vec<bool>) -> Self {
+        Message { bits }
+    }
+
     /// The message whose bit j is 1 where `values[j]` is positive.
     pub fn from_signs(values: &[f64]) -> Self {
         Message { bits: values.iter().map(|v| *v > 0.0).collect() }
@@ -57,6 +62,16 @@ impl Message {
     /// How many bits differ from `other`, which has as many.
     pub fn errors(&self, other: &Message) -> usize {
         self.bits.iter().zip(&other.bits).filter(|(a, b)| a != b).count()
+    }
+
+    /// The same but for one bit.
+    ///
+    /// # Panics
+    /// There is no such bit.
+    pub fn with_flipped(&self, bit: usize) -> Self {
+        let mut flipped = self.clone();
+        flipped.bits[bit] = !flipped.bits[bit];
+        flipped
     }
 
     /// Lower-case hexadecimal digits.

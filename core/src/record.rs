@@ -27,6 +27,9 @@ pub struct Record {
     pub recipient: Option<String>,
     /// The message, hexadecimal.
     pub message: String,
+    /// Whether the key whitened it before it was coded; left out where it did not, as of recipients.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub whitened: bool,
     /// α.
     pub amplitude_m: f64,
     /// How the message becomes the channel bits.
@@ -102,6 +105,10 @@ pub struct TopologyEntry {
     pub attenuated_vertices: usize,
 }
 
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
 impl Record {
     /// Reads a record's text and checks that its values are legal.
     ///
@@ -117,6 +124,7 @@ impl Record {
             return Err(Error::Record(format!("version {found} instead of {VERSION}")));
         }
         record.parameters()?;
+        record.subject()?;
         let bits = record.message()?.len();
         record.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;
         Ok(record)
@@ -171,11 +179,15 @@ impl Record {
     /// What the mark says.
     ///
     /// # Errors
-    /// As [`Record::message`].
+    /// As [`Record::message`], and when it has a recipient and a whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
+            Some(_) if self.whitened => {
+                Err(Error::Record("it has a recipient and a whitened message, of which only one can be".into()))
+            }
             Some(text) => Ok(Subject::Recipient(text.clone())),
-            None => Ok(Subject::Message(self.message()?)),
+            None if self.whitened => Ok(Subject::Message(self.message()?)),
+            None => Ok(Subject::Unwhitened(self.message()?)),
         }
     }
 }

@@ -212,11 +212,9 @@ pub fn record(
         meshmark_record: record::VERSION,
         software: concat!("meshmark ", env!("CARGO_PKG_VERSION")).into(),
         key_id: key.id(),
-        recipient: match subject {
-            Subject::Recipient(text) => Some(text.clone()),
-            Subject::Message(_) => None,
-        },
+        recipient: subject.recipient().map(String::from),
         message: subject.message(key).to_hex(),
+        whitened: matches!(subject, Subject::Message(_)),
         amplitude_m: parameters.amplitude_m,
         code: parameters.code,
         chip_rate: parameters.chip_rate,

@@ -129,7 +129,7 @@ impl Marking {
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map()?;
         marking::check_extent(&on_ground, &options.parameters)?;
-        let message = request.subject.message(&request.key);
+        let message = request.subject.carried(&request.key);
         let pool = pool(threads)?;
         let marked =
             pool.install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
@@ -164,7 +164,7 @@ impl Marking {
     /// somebody read them, in canonical order.
     pub fn check_message(&self, request: &Request, found: &[[f64; 2]], threads: usize) -> Result<()> {
         let parameters = &request.options.parameters;
-        let message = request.subject.message(&request.key);
+        let message = request.subject.carried(&request.key);
         let map = self.map.map()?;
         let pairs = map.vertices.coords().iter().zip(found);
         let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();

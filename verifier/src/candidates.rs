@@ -5,13 +5,15 @@
 
 use crate::{
     Error, Result,
-    decision::{Decision, Verdict, decide_among},
+    decision::{Decision, Expected, Verdict, decide_among},
     progress::Progress,
     reading,
     report::{Report, power_of_ten, printable},
     verify::{Examination, Request, check_key, check_reference, examine, read_reference},
 };
-use meshmark_core::{demodulation::Demodulation, key::SecretKey, message::Message, record::Record};
+use meshmark_core::{
+    demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
+};
 use serde::Serialize;
 use std::path::Path;
 
@@ -81,6 +83,8 @@ impl Entry {
 struct Candidate {
     file: String,
     record: Record,
+    subject: Subject,
+    /// As the record has it.
     message: Message,
 }
 
@@ -136,8 +140,7 @@ pub fn verify_candidates(
     let (template, seen) = &examined[best.group];
     let chosen = Request {
         record: Some(best.candidate.record.clone()),
-        recipient: best.candidate.record.recipient.clone(),
-        expected: Some(best.candidate.message.clone()),
+        subject: Some(best.candidate.subject.clone()),
         ..template.clone()
     };
     let report = Report::new(&chosen, seen, overall(&outcomes), progress.finish());
@@ -172,11 +175,13 @@ fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) 
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let checked = reading::record(&path).and_then(|record| {
             check_key(&record, key)?;
-            let message = record.message()?;
-            Ok((record, message))
+            let (subject, message) = (record.subject()?, record.message()?);
+            Ok((record, subject, message))
         });
         match checked {
-            Ok((record, message)) => candidates.push(Candidate { file, record, message }),
+            Ok((record, subject, message)) => {
+                candidates.push(Candidate { file, record, subject, message });
+            }
             Err(error) => skip(&file, without_name(&error, &path)),
         }
     }
@@ -255,11 +260,12 @@ fn decide_all(
     let messages: Vec<_> =
         (0..examined.len()).map(|group| found(group).ok().map(Demodulation::message)).collect();
     let decide = |(group, candidate): (usize, Candidate)| {
+        let expected = Expected::new(&candidate.subject, &examined[group].0.key);
         let decision = match found(group) {
-            Ok(found) => decide_among(found, &candidate.message, tried, significance),
+            Ok(found) => decide_among(found, &expected, tried, significance),
             Err(reason) => Decision::inconclusive(reason.clone()),
         };
-        let bit_errors = messages[group].as_ref().map(|message| message.errors(&candidate.message));
+        let bit_errors = messages[group].as_ref().map(|message| message.errors(&expected.carried));
         Outcome { group, candidate, decision, bit_errors }
     };
     let all = of_group

@@ -1,12 +1,13 @@
 //! What a report file holds beyond the answer.
 
 use crate::{
+    decision::Expected,
     inputs::Inputs,
     report::{Report, printable},
     sketch::Sketch,
     verify::{Examination, Request},
 };
-use meshmark_core::carrier::Carrier;
+use meshmark_core::{carrier::Carrier, demodulation::Demodulation};
 use serde::Serialize;
 
 /// Where on the map the evidence is.
@@ -39,9 +40,9 @@ pub struct Provenance {
 impl Evidence {
     pub(crate) fn new(request: &Request, seen: &Examination) -> Option<Self> {
         let sketch = seen.sketch.clone()?;
-        let tested = seen.found.as_ref().ok().zip(request.expected.as_ref());
-        let scores = |(found, message): (&meshmark_core::demodulation::Demodulation, _)| {
-            found.patch_scores(&Carrier::new(&request.key), message, sketch.patches.len())
+        let tested = seen.found.as_ref().ok().zip(request.expected());
+        let scores = |(found, expected): (&Demodulation, Expected)| {
+            found.patch_scores(&Carrier::new(&request.key), &expected.carried, sketch.patches.len())
         };
         let patch_scores = tested.map(scores).unwrap_or_default();
         Some(Evidence { sketch, patch_scores })

@@ -82,9 +82,9 @@ impl EvidenceMap {
     /// The same with the score of every patch for the message that is expected.
     pub fn scored(&self, request: &Request, found: Option<&Demodulation>) -> Self {
         let mut scored = self.clone();
-        if let Some((found, message)) = found.zip(request.expected.as_ref()) {
+        if let Some((found, message)) = found.zip(request.expected()) {
             let carrier = Carrier::new(&request.key);
-            let scores = found.patch_scores(&carrier, message, self.patches.len());
+            let scores = found.patch_scores(&carrier, &message.carried, self.patches.len());
             scored.patches.iter_mut().zip(scores).for_each(|(patch, score)| patch.score = score);
         }
         scored

@@ -1,7 +1,7 @@
 //! What `--explain` prints: the report in sentences, for one who must rely on it.
 
 use crate::{
-    decision::Verdict,
+    decision::{Null, Verdict},
     inputs::{Digested, Inputs},
     report::{Report, clipped, power_of_ten},
 };
@@ -94,7 +94,8 @@ fn found(report: &Report) -> Vec<String> {
     let errors = report.bit_errors.map_or(String::new(), |errors| {
         format!(", which differs from the expected message in {errors} of {} bits", report.bits.len())
     });
-    sentences.push(format!("The suspect was read as the message {message}{errors}."));
+    let other = report.other_reading();
+    sentences.push(format!("The suspect was read as the message {message}{other}{errors}."));
     sentences.extend(report.decoding().map(|how| format!("How it was decoded: {how}.")));
     sentences.extend(probabilities(report));
     sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
@@ -137,14 +138,25 @@ pub(crate) fn probabilities(report: &Report) -> Vec<String> {
         ));
     }
     if let Some(p) = report.p_recipient_log10 {
-        sentences.push(format!(
-            "A recipient of this key who has nothing to do with the copy agrees so well with a probability of {}.",
-            power_of_ten(p)
-        ));
+        let other = match report.null_hypothesis {
+            Some(Null::AnyOtherMessage) => {
+                "The message was not whitened, so numbers in sequence differ in few bits. A copy with any other message, \
+                 also one that differs in a single bit,"
+            }
+            _ => "A recipient of this key who has nothing to do with the copy, and so a random message,",
+        };
+        sentences.push(format!("{other} agrees so well with a probability of {}.", power_of_ten(p)));
     }
     if let Some(p) = report.p_any_message_log10 {
         sentences.push(format!(
             "A key that was not used shows so much evidence for any message at all with a probability of {}.",
+            power_of_ten(p)
+        ));
+    }
+    if let (None, 2.., Some(p)) = (&report.candidates, report.tried, report.p_value_log10) {
+        sentences.push(format!(
+            "There was no record to say whether the key whitened the message, and both were tried, so the larger of the \
+             probabilities for key and message counts twice: {}.",
             power_of_ten(p)
         ));
     }

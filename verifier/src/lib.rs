@@ -28,6 +28,7 @@ pub mod reading;
 pub mod registration;
 pub mod report;
 pub mod report_file;
+mod rivals;
 mod search;
 mod shapes;
 pub mod sketch;

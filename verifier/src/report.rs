@@ -2,7 +2,7 @@
 
 use crate::{
     candidates::Candidates,
-    decision::{Decision, Verdict, p_any_message_log10},
+    decision::{Decision, Null, Verdict, p_any_message_log10},
     decoys::Decoys,
     error::ExitCode,
     evidence::{Evidence, Provenance},
@@ -13,7 +13,8 @@ use crate::{
 use meshmark_core::{
     code::{Code, Decoder},
     demodulation::Demodulation,
-    options::{Laplacian, Shape},
+    message::Message,
+    options::{Laplacian, Shape, Subject},
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -27,11 +28,13 @@ pub struct Report {
     pub verdict: Verdict,
     /// One sentence why.
     pub reason: String,
-    /// The message as decoded, hexadecimal; null when nothing was decoded.
+    /// The message as decoded, hexadecimal, as MESSAGE would give it; null when nothing was decoded.
     pub message: Option<String>,
-    /// Log-likelihood ratios of its bits after decoding, natural logarithm, positive = 1.
+    /// The bits that the code carries for it, hexadecimal: where the key whitens the message, other ones.
+    pub carried_message: Option<String>,
+    /// Log-likelihood ratios of these bits after decoding, natural logarithm, positive = 1.
     pub bits: Vec<f64>,
-    /// How many bits differ from the expected message.
+    /// How many of these bits differ from those of the expected message.
     pub bit_errors: Option<usize>,
     /// How the message was decoded.
     pub code: CodeEntry,
@@ -39,8 +42,10 @@ pub struct Report {
     pub p_value_log10: Option<f64>,
     /// log₁₀ p of this much evidence under a random key.
     pub p_mark_log10: Option<f64>,
-    /// log₁₀ p of this much agreement with a random recipient.
+    /// log₁₀ p of this much agreement under `null_hypothesis`.
     pub p_recipient_log10: Option<f64>,
+    /// What the copy of somebody else carries; null when no message was expected.
+    pub null_hypothesis: Option<Null>,
     /// log₁₀ p of this much evidence for any message at all under a random key.
     pub p_any_message_log10: Option<f64>,
     /// The records that were tried; null when one mark was asked for.
@@ -59,6 +64,12 @@ pub struct Report {
     pub provenance: Option<Provenance>,
     /// Where on the map the evidence is; null but in a report file.
     pub evidence: Option<Evidence>,
+    /// How many messages were tried.
+    #[serde(skip)]
+    pub tried: usize,
+    /// The expected message as the code carries it, hexadecimal.
+    #[serde(skip)]
+    pub expected_carried: Option<String>,
     /// Digest of the vertices of the reference.
     #[serde(skip)]
     pub reference_digest: String,
@@ -126,7 +137,8 @@ impl Report {
         decision: Decision,
         seconds: &BTreeMap<&'static str, f64>,
     ) -> Self {
-        let (found, expected) = (seen.found.as_ref().ok(), request.expected.as_ref());
+        let (found, hypothesis) = (seen.found.as_ref().ok(), request.expected());
+        let expected = hypothesis.as_ref().map(|hypothesis| &hypothesis.carried);
         let decoded = found.map(Demodulation::decode);
         let tested = found.zip(expected).map(|(found, expected)| found.mark_score(expected));
         let code = CodeEntry {
@@ -145,7 +157,11 @@ impl Report {
             candidates: None,
             decoys: seen.decoys.clone().map(|decoys| Decoys { tested, ..decoys }),
             reason: decision.reason,
-            message: decoded.as_ref().map(|decoded| decoded.message.to_hex()),
+            message: decoded.as_ref().map(|decoded| as_given(request, &decoded.message).to_hex()),
+            carried_message: decoded.as_ref().map(|decoded| decoded.message.to_hex()),
+            expected_carried: expected.map(Message::to_hex),
+            null_hypothesis: hypothesis.as_ref().map(|hypothesis| hypothesis.null),
+            tried: decision.tried,
             bit_errors: decoded.as_ref().zip(expected).map(|(decoded, m)| decoded.message.errors(m)),
             bits: decoded.map(|decoded| decoded.message_llrs).unwrap_or_default(),
             code,
@@ -176,7 +192,7 @@ impl Report {
             let errors = self.bit_errors.map_or(String::new(), |errors| {
                 format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
             });
-            lines.push(format!("message:      {message}{errors}"));
+            lines.push(format!("message:      {message}{}{errors}", self.other_reading()));
             // Of noise, too, a code word and bits are made; their odds suppose a mark.
             lines.extend(self.decoding().map(|how| format!("code:         {how}")));
             lines.push(match self.shows_mark() {
@@ -199,10 +215,7 @@ impl Report {
         if let (Some(p), Some(mark), Some(recipient)) =
             (self.p_value_log10, self.p_mark_log10, self.p_recipient_log10)
         {
-            let tried = match &self.candidates {
-                Some(candidates) if candidates.tried > 1 => format!(", times {} tried", candidates.tried),
-                _ => String::new(),
-            };
+            let tried = if self.tried > 1 { format!(", times {} tried", self.tried) } else { String::new() };
             lines.push(format!(
                 "p-value:      {} (key {}, recipient {}{tried})",
                 power_of_ten(p),
@@ -218,6 +231,14 @@ impl Report {
             lines.push(format!("key:          {says} (p-value {})", power_of_ten(p)));
         }
         lines
+    }
+
+    /// What the message is where nothing says whether the key whitened it.
+    pub(crate) fn other_reading(&self) -> String {
+        let carried = self.carried_message.as_ref().filter(|_| self.parameters.expected_message.is_none());
+        carried.map_or(String::new(), |carried| {
+            format!(", or {carried} if it is that of a recipient or was not whitened")
+        })
     }
 
     /// What LDPC did with the mark that shows, for a person.
@@ -266,8 +287,8 @@ impl ReportParameters {
         let p = &request.parameters;
         ReportParameters {
             key_id: request.key.id(),
-            recipient: request.recipient.clone(),
-            expected_message: request.expected.as_ref().map(|m| m.to_hex()),
+            recipient: request.recipient().map(String::from),
+            expected_message: request.subject.as_ref().map(|s| s.message(&request.key).to_hex()),
             amplitude_m: p.amplitude_m,
             code: p.code,
             chip_rate: p.chip_rate,
@@ -288,6 +309,12 @@ impl ReportParameters {
             software: format!("meshmark {}", env!("CARGO_PKG_VERSION")),
         }
     }
+}
+
+/// The decoded bits as MESSAGE would give them: without an expected message those of a new mark.
+fn as_given(request: &Request, carried: &Message) -> Message {
+    let new = || Subject::Message(carried.clone());
+    request.subject.clone().unwrap_or_else(new).message_of(carried, &request.key)
 }
 
 /// A probability from its logarithm.

@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     crs_search::{self, Registered, side},
-    decision::{Decision, decide},
+    decision::{Decision, Expected, decide_among},
     decoys::Decoys,
     evidence_map::EvidenceMap,
     joined::Graph,
@@ -20,8 +20,7 @@ use meshmark_core::{
     demodulation::{self, Demodulation},
     ground::Ground,
     key::SecretKey,
-    message::Message,
-    options::{Parameters, Spelling},
+    options::{Parameters, Spelling, Subject},
     patches::Patches,
     record::Record,
 };
@@ -48,10 +47,8 @@ pub struct Request {
     pub suspect: PathBuf,
     /// What the driver wrote when it marked.
     pub record: Option<Record>,
-    /// The recipient the message was made from.
-    pub recipient: Option<String>,
-    /// The message the suspect should carry, if it is known.
-    pub expected: Option<Message>,
+    /// What the mark should say, if it is known.
+    pub subject: Option<Subject>,
     /// Bits of the message.
     pub bits: usize,
     /// The numbers that shaped the mark.
@@ -77,6 +74,26 @@ pub struct Request {
 }
 
 impl Request {
+    /// The bits that the code should carry, if they are known.
+    pub fn expected(&self) -> Option<Expected> {
+        self.subject.as_ref().map(|subject| Expected::new(subject, &self.key))
+    }
+
+    /// The recipient that the message is made from.
+    pub fn recipient(&self) -> Option<&str> {
+        self.subject.as_ref().and_then(Subject::recipient)
+    }
+
+    /// What the mark may say: without a record, a message may be of the time before whitening.
+    fn subjects(&self) -> Vec<Subject> {
+        match (&self.record, &self.subject) {
+            (None, Some(Subject::Message(message))) => {
+                vec![Subject::Message(message.clone()), Subject::Unwhitened(message.clone())]
+            }
+            (_, subject) => subject.iter().cloned().collect(),
+        }
+    }
+
     fn landmarks(&self) -> LabelFields<'_> {
         match self.landmarks.as_slice() {
             [] => LabelFields::All,
@@ -117,11 +134,26 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
         check_reference(record, request, &reference, &reference.vertices.digest())?;
     }
     let seen = examine(request, &reference, progress)?;
-    let decision = match &seen.found {
-        Ok(found) => decide(found, request.expected.as_ref(), request.significance),
-        Err(reason) => Decision::inconclusive(reason.clone()),
+    let (subject, decision) = match &seen.found {
+        Ok(found) => decide_subjects(request, found),
+        Err(reason) => (request.subject.clone(), Decision::inconclusive(reason.clone())),
     };
-    Ok(Report::new(request, &seen, decision, progress.finish()))
+    let request = Request { subject, ..request.clone() };
+    Ok(Report::new(&request, &seen, decision, progress.finish()))
+}
+
+/// The best of what the mark may say, and the decision on it.
+fn decide_subjects(request: &Request, found: &Demodulation) -> (Option<Subject>, Decision) {
+    let subjects = request.subjects();
+    let tried = subjects.len();
+    let decide = |subject: Subject| {
+        let expected = Expected::new(&subject, &request.key);
+        (Some(subject), decide_among(found, &expected, tried, request.significance))
+    };
+    let p = |decision: &Decision| decision.p_value_log10().unwrap_or(f64::INFINITY);
+    let decisions = subjects.into_iter().map(decide);
+    let best = decisions.min_by(|(_, a), (_, b)| p(a).total_cmp(&p(b)));
+    best.unwrap_or_else(|| (None, Decision::without_message()))
 }
 
 /// Reads the reference of a request.

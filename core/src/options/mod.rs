@@ -14,6 +14,7 @@ use crate::{
     code::Code,
     key::{RECIPIENT_BITS, SecretKey},
     message::Message,
+    whitening::{unwhiten, whiten},
 };
 
 /// What the mark says: a name, or the bits themselves.
@@ -21,16 +22,43 @@ use crate::{
 pub enum Subject {
     /// The message is a keyed hash of this text.
     Recipient(String),
-    /// The message.
+    /// The message, which the key whitens before it is coded.
     Message(Message),
+    /// The message of a mark of the time before whitening: its own bits are coded.
+    Unwhitened(Message),
 }
 
 impl Subject {
-    /// The message under a key.
+    /// The bits that the code carries under a key.
+    pub fn carried(&self, key: &SecretKey) -> Message {
+        match self {
+            Subject::Recipient(text) => key.recipient_message(text),
+            Subject::Message(message) => whiten(key, message),
+            Subject::Unwhitened(message) => message.clone(),
+        }
+    }
+
+    /// The message as records and reports have it, of the bits that the code carries.
+    pub fn message_of(&self, carried: &Message, key: &SecretKey) -> Message {
+        match self {
+            Subject::Message(_) => unwhiten(key, carried),
+            Subject::Recipient(_) | Subject::Unwhitened(_) => carried.clone(),
+        }
+    }
+
+    /// The message as records and reports have it.
     pub fn message(&self, key: &SecretKey) -> Message {
         match self {
             Subject::Recipient(text) => key.recipient_message(text),
-            Subject::Message(message) => message.clone(),
+            Subject::Message(message) | Subject::Unwhitened(message) => message.clone(),
+        }
+    }
+
+    /// The recipient, when the message is made from one.
+    pub fn recipient(&self) -> Option<&str> {
+        match self {
+            Subject::Recipient(text) => Some(text),
+            Subject::Message(_) | Subject::Unwhitened(_) => None,
         }
     }
 }
@@ -65,7 +93,7 @@ impl Options {
         let subject = values.subject()?;
         let bits = match &subject {
             Some(Subject::Message(message)) => message.len(),
-            Some(Subject::Recipient(_)) | None => RECIPIENT_BITS,
+            _ => RECIPIENT_BITS,
         };
         let code = values.choice("CODE", Code::from_name)?.unwrap_or(Code::default_for(bits));
         code.channel_bits(bits)?;

@@ -3,7 +3,6 @@
 use super::arguments::VerifyArgs;
 use meshmark_core::{
     key::RECIPIENT_BITS,
-    message::Message,
     options::{Options, Spelling, Subject},
     record::Record,
 };
@@ -23,14 +22,9 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         }
         None => options,
     };
-    let expected = options.subject.as_ref().map(|subject| subject.message(&key));
     Ok(Request {
-        bits: expected.as_ref().map_or(RECIPIENT_BITS, Message::len),
-        recipient: options.subject.and_then(|subject| match subject {
-            Subject::Recipient(text) => Some(text),
-            Subject::Message(_) => None,
-        }),
-        expected,
+        bits: options.subject.as_ref().map_or(RECIPIENT_BITS, |subject| subject.message(&key).len()),
+        subject: options.subject,
         key,
         reference: args.reference,
         suspect: args.suspect,

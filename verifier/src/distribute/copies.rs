@@ -35,9 +35,9 @@ impl Copy {
         Copy { file: path(format.ending()), record: path(".json"), recipient }
     }
 
-    /// The message in it.
-    pub fn message(&self, key: &SecretKey) -> Message {
-        self.subject().message(key)
+    /// The bits that the code carries in it.
+    pub fn carried(&self, key: &SecretKey) -> Message {
+        self.subject().carried(key)
     }
 
     /// What the mark says.

@@ -181,7 +181,7 @@ fn run(
     let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
     progress.start("patches", 0);
     let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
-    let message = copies[0].message(key);
+    let message = copies[0].carried(key);
     let warnings = marking::warnings(parameters, &message, survey, embedding.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
     let reference = marking::reference(survey, embedding.patches());
@@ -193,7 +193,7 @@ fn run(
     let mut written = 0;
     for batch in copies.chunks(embedding.batch()) {
         progress.start("solving patches", embedding.patches() as u64);
-        let messages: Vec<_> = batch.iter().map(|copy| copy.message(key)).collect();
+        let messages: Vec<_> = batch.iter().map(|copy| copy.carried(key)).collect();
         let wanted = pool.install(|| embedding.wanted(&messages, &progress.stepper()))?;
         progress.start("writing copies", batch.len() as u64);
         let step = progress.stepper();

@@ -42,13 +42,13 @@ fn decoded(report: &Report, message: &str) -> Markup {
                 false => { "No mark of this key shows, so these bits are no better than guessed: noise, too, reads as some message." }
             }
         }
-        (figure(&bits(report, message, expected), &legend(report)))
+        (figure(&bits(report), &legend(report)))
     }
 }
 
-fn bits(report: &Report, message: &str, expected: Option<&str>) -> Markup {
-    let expected: Option<Vec<bool>> = expected.map(bits_of);
-    let read = bits_of(message);
+fn bits(report: &Report) -> Markup {
+    let expected: Option<Vec<bool>> = report.expected_carried.as_deref().map(bits_of);
+    let read = bits_of(report.carried_message.as_deref().unwrap_or_default());
     let rows = report.bits.chunks(ROW).enumerate();
     html! {
         table.bits {
