@@ -142,7 +142,7 @@ mod tests {
         let coords = (0..polygons.len()).map(|i| [i as f64, (i * i) as f64]).collect();
         let vertices = VertexTable::new(coords).unwrap();
         let ground = Ground::Plane { metres_per_unit: 1.0 };
-        let map = Map { vertices: &vertices, segments: &[], polygons, ground };
+        let map = Map { vertices: &vertices, segments: &[], polygons, ..Map::of_points(&vertices, ground) };
         let found = Bodies::find(&map, touching.iter().copied());
         found.as_slice().iter().map(|body| body.members.clone()).collect()
     }

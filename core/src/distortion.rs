@@ -1,6 +1,6 @@
 //! What marking does to a map, in figures.
 
-use crate::{ground::Ground, map::Map, vertices::VertexTable};
+use crate::{map::Map, scale::Measure, vertices::VertexTable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -97,9 +97,9 @@ pub struct Displacement {
 
 impl Displacement {
     /// From the vertices of a map to where they are now, in canonical order.
-    pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], ground: &Ground) -> Self {
+    pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], measure: &Measure) -> Self {
         let metres = |(from, to): (&[f64; 2], &[f64; 2])| {
-            let [dx, dy] = ground.metres_between(*from, *to);
+            let [dx, dy] = measure.metres_between(*from, *to);
             dx.hypot(dy)
         };
         let spread = Spread::of(vertices.coords().iter().zip(moved).map(metres).collect());
@@ -147,7 +147,7 @@ impl AngleChange {
         let corners: Vec<&[[u32; 2]]> = ends.chunk_by(|a, b| a[0] == b[0]).filter(|c| c.len() == 2).collect();
         let angles = |corner: &&[[u32; 2]]| {
             let [from, at, to] = [corner[0][1], corner[0][0], corner[1][1]];
-            let scale = map.ground.metres_per_unit(map.at(at));
+            let scale = map.measure().metres_per_unit(map.at(at));
             let angle = |coords: &[[f64; 2]]| {
                 let [from, at, to] = [from, at, to].map(|v| coords[v as usize]);
                 angle_deg(from, at, to, scale)
@@ -176,6 +176,7 @@ pub fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ground::Ground;
 
     #[test]
     fn a_corner_has_two_segments_and_is_measured_on_the_ground() {

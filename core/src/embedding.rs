@@ -57,7 +57,7 @@ pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Paramet
 /// All of a marking that does not depend on the message.
 pub struct Embedding<'a> {
     map: &'a Map<'a>,
-    placement: Placement,
+    placement: Placement<'a>,
     tree: VertexTree<'a>,
     patches: Patches,
     /// The bases of the first patches, when they are kept.
@@ -180,7 +180,7 @@ impl<'a> Embedding<'a> {
         let settled = settle(map, &self.tree, patches.constraints(), wanted, &self.placement);
         self.check_message(message, &settled)?;
         Ok(Marked {
-            displacement: Displacement::between(map.vertices, &settled.coords, &map.ground),
+            displacement: Displacement::between(map.vertices, &settled.coords, &map.measure()),
             angles: AngleChange::at_corners(map, &settled.coords),
             coords: settled.coords,
             patches: patches.as_slice().len(),

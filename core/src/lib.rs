@@ -60,6 +60,7 @@ pub mod patches;
 mod placement;
 pub mod record;
 mod response;
+pub mod scale;
 mod sides;
 pub mod spectrum;
 mod topology;

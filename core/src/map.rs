@@ -1,6 +1,10 @@
 //! A map as the algorithm sees it.
 
-use crate::{ground::Ground, vertices::VertexTable};
+use crate::{
+    ground::Ground,
+    scale::{Measure, ScaleLattice},
+    vertices::VertexTable,
+};
 
 /// Vertices, what joins them, and how long a unit is.
 #[derive(Debug, Clone, Copy)]
@@ -12,14 +16,21 @@ pub struct Map<'a> {
     pub segments: &'a [[u32; 2]],
     /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
     pub polygons: &'a [u32],
-    /// Metres on the ground.
+    /// Metres on the ground, as the mark has them.
     pub ground: Ground,
+    /// Metres on the ground where a vertex is, when they are others.
+    pub lattice: Option<&'a ScaleLattice>,
 }
 
 impl<'a> Map<'a> {
     /// A map of points alone.
     pub fn of_points(vertices: &'a VertexTable, ground: Ground) -> Self {
-        Map { vertices, segments: &[], polygons: &[], ground }
+        Map { vertices, segments: &[], polygons: &[], ground, lattice: None }
+    }
+
+    /// Metres where a vertex is.
+    pub fn measure(&self) -> Measure<'a> {
+        Measure { ground: self.ground, lattice: self.lattice }
     }
 
     /// The coordinates of a vertex, CRS units.

@@ -1,22 +1,22 @@
 //! Where a vertex ends that shall move: within the tolerance, on the output grid, off the edges of the world.
 
-use crate::{Error, Result, ground::Ground, map::Map, options::Parameters};
+use crate::{Error, Result, map::Map, options::Parameters, scale::Measure};
 
 /// What holds a displacement back.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Placement {
-    ground: Ground,
+pub(crate) struct Placement<'a> {
+    measure: Measure<'a>,
     tolerance_m: f64,
     precision: Option<f64>,
 }
 
-impl Placement {
+impl<'a> Placement<'a> {
     /// # Errors
     /// [`Error::PrecisionTooCoarse`].
-    pub fn new(map: &Map, parameters: &Parameters) -> Result<Self> {
+    pub fn new(map: &Map<'a>, parameters: &Parameters) -> Result<Self> {
         check_precision(map, parameters)?;
         let Parameters { tolerance_m, precision, .. } = *parameters;
-        Ok(Placement { ground: map.ground, tolerance_m, precision })
+        Ok(Placement { measure: map.measure(), tolerance_m, precision })
     }
 
     /// Where a vertex at `from` ends that should move by `wanted`, CRS units.
@@ -24,7 +24,7 @@ impl Placement {
         if self.is_pinned(from) {
             return from;
         }
-        let scale = self.ground.metres_per_unit(from);
+        let scale = self.measure.metres_per_unit(from);
         let wanted_m = (wanted[0] * scale[0]).hypot(wanted[1] * scale[1]);
         let mut share = 1f64.min(self.tolerance_m / wanted_m);
         loop {
@@ -44,17 +44,18 @@ impl Placement {
 
     /// Whether a vertex at `from` may end there.
     pub fn allows(&self, from: [f64; 2], to: [f64; 2]) -> bool {
-        !self.is_pinned(from) && distance_m(from, to, self.ground.metres_per_unit(from)) <= self.tolerance_m
+        !self.is_pinned(from) && distance_m(from, to, self.measure.metres_per_unit(from)) <= self.tolerance_m
     }
 
     /// Whether a vertex must stay where it is.
     pub fn is_pinned(&self, from: [f64; 2]) -> bool {
-        self.ground.is_pinned(from, self.tolerance_m)
+        self.measure.ground.is_pinned(from, self.tolerance_m)
     }
 
-    /// No vertex moves further, metres.
-    pub fn tolerance_m(&self) -> f64 {
-        self.tolerance_m
+    /// No vertex near `at` moves further, metres of a `scale` in metres per unit.
+    pub fn tolerance_in(&self, at: [f64; 2], scale: [f64; 2]) -> f64 {
+        let there = self.measure.metres_per_unit(at);
+        self.tolerance_m * (scale[0] / there[0]).min(scale[1] / there[1])
     }
 
     /// The side of a cell of the output grid, CRS units; 0 without a grid.
@@ -102,7 +103,7 @@ fn check_precision(map: &Map, parameters: &Parameters) -> Result<()> {
     let (min, max) = map.vertices.bounds();
     // A degree of longitude is longest where the map comes nearest to the equator.
     let widest_y = if min[1] <= 0.0 && max[1] >= 0.0 { 0.0 } else { min[1].abs().min(max[1].abs()) };
-    let scale = [min[1], max[1], widest_y].map(|y| map.ground.metres_per_unit([min[0], y]));
+    let scale = [min[1], max[1], widest_y].map(|y| map.measure().metres_per_unit([min[0], y]));
     let metres = precision * scale.iter().flatten().fold(0f64, |a, &b| a.max(b));
     if metres > parameters.tolerance_m {
         return Err(Error::PrecisionTooCoarse { precision, metres, tolerance_m: parameters.tolerance_m });

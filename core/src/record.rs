@@ -182,9 +182,9 @@ impl Record {
     /// As [`Record::message`], and when it has a recipient and a whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
-            Some(_) if self.whitened => {
-                Err(Error::Record("it has a recipient and a whitened message, of which only one can be".into()))
-            }
+            Some(_) if self.whitened => Err(Error::Record(
+                "it has a recipient and a whitened message, of which only one can be".into(),
+            )),
             Some(text) => Ok(Subject::Recipient(text.clone())),
             None if self.whitened => Ok(Subject::Message(self.message()?)),
             None => Ok(Subject::Unwhitened(self.message()?)),

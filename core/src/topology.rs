@@ -77,7 +77,7 @@ type Hit = [u32; 3];
 struct Movement<'a> {
     map: Map<'a>,
     constraints: &'a Constraints,
-    placement: &'a Placement,
+    placement: &'a Placement<'a>,
     slack: Slack,
     /// CRS units.
     wanted: &'a [[f64; 2]],
@@ -97,7 +97,7 @@ impl<'a> Movement<'a> {
         map: Map<'a>,
         constraints: &'a Constraints,
         wanted: &'a [[f64; 2]],
-        placement: &'a Placement,
+        placement: &'a Placement<'a>,
     ) -> Self {
         let (min, max) = map.vertices.bounds();
         let [_, metres_per_unit] = map.ground.metres_per_unit(map.vertices.centre());
@@ -141,7 +141,10 @@ impl<'a> Movement<'a> {
         };
         let motion = match body.members.iter().any(|&v| self.placement.is_pinned(self.map.at(v))) {
             true => Motion::default(),
-            false => body.within(motion, self.placement.tolerance_m()),
+            false => {
+                let at = self.map.at(body.members[0]);
+                body.within(motion, self.placement.tolerance_in(at, body.scale))
+            }
         };
         for (&v, displacement_m) in body.members.iter().zip(body.displacements_m(&motion)) {
             self.displacements[v as usize] = in_units(displacement_m, body.scale);

@@ -67,7 +67,8 @@ mod tests {
     fn serial_numbers_are_carried_as_unlike_as_random_messages() {
         let carried: Vec<Message> =
             (0..200).map(|n| whiten(&key(9), &message(&format!("{n:032x}")))).collect();
-        let pairs = carried.iter().enumerate().flat_map(|(i, a)| carried[..i].iter().map(move |b| a.errors(b)));
+        let pairs =
+            carried.iter().enumerate().flat_map(|(i, a)| carried[..i].iter().map(move |b| a.errors(b)));
         let errors: Vec<usize> = pairs.collect();
         let mean = errors.iter().sum::<usize>() as f64 / errors.len() as f64;
         // 19 900 pairs of 128 random bits: a standard deviation of 5.66 about 64 each.

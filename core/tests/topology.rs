@@ -39,7 +39,7 @@ impl Town {
 
     fn map(&self) -> Map<'_> {
         let Town { vertices, segments, polygons } = self;
-        Map { vertices, segments, polygons, ground: METRES }
+        Map { segments, polygons, ..Map::of_points(vertices, METRES) }
     }
 
     fn coords(&self) -> &[[f64; 2]] {

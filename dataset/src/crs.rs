@@ -2,7 +2,11 @@
 
 use crate::{Error, Result};
 use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
-use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_core::{
+    ground::Ground,
+    scale::{Scale, ScaleLattice},
+    vertices::VertexTable,
+};
 
 /// The CRS of a map.
 #[derive(Debug, Clone)]
@@ -62,6 +66,13 @@ impl CoordinateSystem {
         x.into_iter().zip(y).map(place).collect()
     }
 
+    /// The scales of a map in which the one of its ground is not right everywhere.
+    pub(crate) fn lattice(&self, table: &VertexTable, ground: &Ground) -> Option<ScaleLattice> {
+        let Ground::Plane { metres_per_unit } = *ground else { return None };
+        let local = Local::new(self)?;
+        ScaleLattice::measure(table, metres_per_unit, NEGLIGIBLE, |places| local.scales(places))
+    }
+
     fn ground(&self, table: &VertexTable) -> Result<Ground> {
         if self.0.is_geocentric() {
             return Err(Error::Geocentric(self.label()));
@@ -84,25 +95,62 @@ impl CoordinateSystem {
         })
     }
 
-    /// Metres per unit at a place: the square root of the areal scale, by differences of 100 units of
-    /// length in longitude and latitude. An EPSG:3857 unit is half a metre at Helsinki.
-    fn measured_metres_per_unit(&self, [x, y]: [f64; 2]) -> Option<f64> {
-        if !self.0.is_projected() {
+    /// Metres per unit at a place: the square root of the areal scale. An EPSG:3857 unit is half a metre at Helsinki.
+    fn measured_metres_per_unit(&self, place: [f64; 2]) -> Option<f64> {
+        let local = Local::new(self)?;
+        let [along_x, along_y] = local.differences(&[place]).pop()??;
+        let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
+        let measured = area.sqrt() / (2.0 * local.step);
+        (measured.is_finite() && measured > 0.0).then_some(measured)
+    }
+}
+
+/// A scale that is wrong by a smaller share is right.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// The scales of a projected CRS, by differences of 100 metres in longitude and latitude.
+struct Local {
+    to_geographic: CoordTransform,
+    ellipsoid: Ground,
+    /// Half a difference, CRS units.
+    step: f64,
+}
+
+impl Local {
+    fn new(crs: &CoordinateSystem) -> Option<Self> {
+        if !crs.0.is_projected() {
             return None;
         }
-        let geographic = CoordinateSystem::new(self.0.geog_cs().ok()?);
-        let step = 50.0 / self.0.linear_units();
-        let mut lon = [x - step, x + step, x, x, x];
-        let mut lat = [y, y, y - step, y + step, y];
-        let to_geographic = self.transform_to(&geographic).ok()?;
-        to_geographic.transform_coords(&mut lon, &mut lat, &mut []).ok()?;
-        let ground = self.ellipsoid(&geographic.0).ok()?;
-        let [m_lon, m_lat] = ground.metres_per_unit([lon[4], lat[4]]);
-        let side = |a: usize, b: usize| [(lon[b] - lon[a]) * m_lon, (lat[b] - lat[a]) * m_lat];
-        let (along_x, along_y) = (side(0, 1), side(2, 3));
-        let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
-        let measured = area.sqrt() / (2.0 * step);
-        (measured.is_finite() && measured > 0.0).then_some(measured)
+        let geographic = CoordinateSystem::new(crs.0.geog_cs().ok()?);
+        let to_geographic = crs.transform_to(&geographic).ok()?;
+        let ellipsoid = crs.ellipsoid(&geographic.0).ok()?;
+        Some(Local { to_geographic, ellipsoid, step: 50.0 / crs.0.linear_units() })
+    }
+
+    /// The metres east and north that two steps along x and two along y are at each of these places.
+    fn differences(&self, places: &[[f64; 2]]) -> Vec<Option<[[f64; 2]; 2]>> {
+        const POINTS: usize = 5;
+        let s = self.step;
+        let around =
+            places.iter().flat_map(|[x, y]| [[x - s, *y], [x + s, *y], [*x, y - s], [*x, y + s], [*x, *y]]);
+        let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = around.map(|[x, y]| (x, y)).unzip();
+        // An error is of some points only; those are not finite then.
+        let _ = self.to_geographic.transform_coords(&mut lon, &mut lat, &mut []);
+        let difference = |(lon, lat): (&[f64], &[f64])| {
+            let [m_lon, m_lat] = self.ellipsoid.metres_per_unit([lon[4], lat[4]]);
+            let side = |a: usize, b: usize| [(lon[b] - lon[a]) * m_lon, (lat[b] - lat[a]) * m_lat];
+            let sides = [side(0, 1), side(2, 3)];
+            sides.as_flattened().iter().all(|metres| metres.is_finite()).then_some(sides)
+        };
+        lon.chunks(POINTS).zip(lat.chunks(POINTS)).map(difference).collect()
+    }
+
+    fn scales(&self, places: &[[f64; 2]]) -> Vec<Option<Scale>> {
+        let scale = |sides: Option<[[f64; 2]; 2]>| {
+            let [along_x, along_y] = sides?.map(|side| side.map(|metres| metres / (2.0 * self.step)));
+            Some(Scale::new(along_x, along_y)).filter(|scale| scale.extremes[0] > 0.0)
+        };
+        self.differences(places).into_iter().map(scale).collect()
     }
 }
 

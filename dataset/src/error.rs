@@ -18,6 +18,7 @@ pub enum Error {
     Reprojection { layer: String, reason: String },
     TooLarge { most: usize },
     TooSmall { size_m: f64, tolerance_m: f64 },
+    UnevenScale { at: [f64; 2], off_percent: f64, crs: String },
     UnknownFormat { named: Option<String>, extension: Option<String>, known: String },
     OneLayer { driver: &'static str },
     NotWgs84 { driver: &'static str, layer: String },
@@ -103,6 +104,11 @@ impl Error {
                 spelling.name("SRS"),
                 spelling.name("TOLERANCE"),
                 spelling.name("AMPLITUDE")
+            ),
+            Error::UnevenScale { at: [x, y], off_percent, crs } => format!(
+                "at the vertex ({x}, {y}) the scale of {crs} differs by {off_percent:.0} % from that in the middle of the \
+                 map, and a mark has one scale, so vertices would move further than is asked for: leave out what lies \
+                 far away, or reproject the map, for example to its UTM zone or to EPSG:4326"
             ),
             Error::UnknownFormat { named, extension, known } => {
                 let what = match (named, extension) {

@@ -1,7 +1,7 @@
 //! A marking, apart from where its source comes from and where its result goes.
 
 use crate::{
-    Error, Geometries, Result, Survey,
+    CoordinateSystem, Error, Geometries, Result, Survey,
     quality::{Comparison, Outlines, Quality, State},
     wkb,
 };
@@ -11,12 +11,12 @@ use gdal::{
 };
 use meshmark_core::{
     embedding::Marked,
-    ground::Ground,
     key::SecretKey,
     map::Map,
     message::{LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Spelling, Subject},
     record::{self, Distortion, Record, Reference, TopologyEntry},
+    scale::Measure,
     vertices::VertexTable,
 };
 use std::borrow::Cow;
@@ -79,6 +79,20 @@ pub fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
     match map.vertices.len() > 1 && size_m < LEAST_TOLERANCES * tolerance_m {
         true => Err(Error::TooSmall { size_m, tolerance_m }),
         false => Ok(()),
+    }
+}
+
+/// Fails where the one scale of the mark is wrong, so that vertices would move further than is asked for.
+///
+/// # Errors
+/// [`Error::UnevenScale`].
+pub fn check_scale(map: &Map, crs: Option<&CoordinateSystem>) -> Result<()> {
+    match map.measure().worst_vertex(map.vertices) {
+        None => Ok(()),
+        Some((at, off)) => {
+            let crs = crs.map_or_else(String::new, CoordinateSystem::label);
+            Err(Error::UnevenScale { at, off_percent: 100.0 * off, crs })
+        }
     }
 }
 
@@ -157,7 +171,7 @@ pub fn reference(map: &Survey, patches: usize) -> Reference {
 pub struct Unmarked<'a> {
     geometries: &'a Geometries,
     coords: &'a [[f64; 2]],
-    ground: Ground,
+    measure: Measure<'a>,
     state: State,
 }
 
@@ -166,7 +180,7 @@ impl<'a> Unmarked<'a> {
     pub fn new(geometries: &'a Geometries, map: &Map<'a>) -> Self {
         let coords = map.vertices.coords();
         let state = State::of(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
-        Unmarked { geometries, coords, ground: map.ground, state }
+        Unmarked { geometries, coords, measure: map.measure(), state }
     }
 
     /// What marking changed.
@@ -177,7 +191,7 @@ impl<'a> Unmarked<'a> {
         let state = State::of(after);
         let grid = parameters.precision.unwrap_or(0.0);
         let comparison =
-            Comparison { before: (before, &self.state), after: (after, &state), ground: self.ground, grid };
+            Comparison { before: (before, &self.state), after: (after, &state), measure: self.measure, grid };
         let Quality { areas, hausdorff, validity, overlaps, .. } = comparison.quality();
         Distortion {
             displacement: marked.displacement,

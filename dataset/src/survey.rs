@@ -8,7 +8,9 @@ use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
-use meshmark_core::{disjoint_sets::DisjointSets, ground::Ground, map::Map, vertices::VertexTable};
+use meshmark_core::{
+    disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice, vertices::VertexTable,
+};
 use std::collections::BTreeMap;
 
 /// Which attributes become labels. With labels come shapes: both are for registration.
@@ -91,6 +93,8 @@ pub struct Survey {
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and could be in degrees.
     ground: Option<Ground>,
+    /// Metres per unit where a vertex is, when they are others.
+    lattice: Option<ScaleLattice>,
     /// Attribute texts and their places.
     pub labels: Vec<Label>,
     /// Rings and lines.
@@ -129,13 +133,15 @@ impl Survey {
         labels.iter_mut().zip(places).for_each(|(label, place)| label.point = place);
         let of_shapes = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
         of_shapes.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
-        let ground = Some(crs::ground(Some(crs), &vertices)?);
+        let ground = crs::ground(Some(crs), &vertices)?;
+        let lattice = crs.lattice(&vertices, &ground);
         Ok(Survey {
             vertices,
             segments,
             polygons,
             crs: Some(crs.clone()),
-            ground,
+            ground: Some(ground),
+            lattice,
             labels,
             shapes,
             geometries: None,
@@ -150,13 +156,22 @@ impl Survey {
         self.ground.ok_or(Error::NoCrs)
     }
 
+    /// What a map is measured with, when it is no longer needed itself.
+    ///
+    /// # Errors
+    /// [`Error::NoCrs`].
+    pub fn into_scales(self) -> Result<(Ground, Option<ScaleLattice>)> {
+        Ok((self.ground()?, self.lattice))
+    }
+
     /// The map as the algorithm sees it.
     ///
     /// # Errors
     /// [`Error::NoCrs`].
     pub fn map(&self) -> Result<Map<'_>> {
         let Survey { vertices, segments, polygons, .. } = self;
-        Ok(Map { vertices, segments, polygons, ground: self.ground()? })
+        let lattice = self.lattice.as_ref();
+        Ok(Map { vertices, segments, polygons, ground: self.ground()?, lattice })
     }
 }
 
@@ -185,9 +200,10 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
+    let lattice = crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&vertices, ground));
     let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
     let (labels, shapes) = (walk.labels, walk.shapes);
-    Ok(Survey { vertices, segments, polygons, crs, ground, labels, shapes, geometries })
+    Ok(Survey { vertices, segments, polygons, crs, ground, lattice, labels, shapes, geometries })
 }
 
 /// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.

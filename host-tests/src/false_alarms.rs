@@ -17,7 +17,11 @@ use meshmark_core::{
     options::Parameters,
 };
 use meshmark_verifier::{
-    Demodulator, Request, decision::decide, progress::Progress, registration::Start, verify,
+    Demodulator, Request,
+    decision::{Decision, Expected, Null, decide_among},
+    progress::Progress,
+    registration::Start,
+    verify,
 };
 use plotters::style::{BLACK, BLUE, RED};
 use serde::Serialize;
@@ -95,8 +99,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         reference: reference.into(),
         suspect: suspect.into(),
         record: None,
-        recipient: None,
-        expected: None,
+        subject: None,
         bits: 128,
         parameters: Parameters { precision: Some(PRECISION_M), ..Parameters::default() },
         layers: None,
@@ -114,6 +117,10 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     Ok(verify::examine(&request, &map, &mut progress)?.found?)
 }
 
+fn decide(found: &Demodulation, carried: Message) -> Decision {
+    decide_among(found, &Expected { carried, null: Null::RandomMessage }, 1, 1e-6)
+}
+
 /// log₁₀ of p_mark of another key and its message for the recipient.
 fn wrong_key(found: &Demodulation, key: &SecretKey) -> f64 {
     let (carrier, chip_rate) = (Carrier::new(key), Parameters::default().chip_rate);
@@ -126,13 +133,12 @@ fn wrong_key(found: &Demodulation, key: &SecretKey) -> f64 {
         }
     }
     let under_key = Demodulation { scores, ..found.clone() };
-    let decision = decide(&under_key, Some(&key.recipient_message("the recipient")), 1e-6);
-    decision.p_mark_log10.expect("a message was expected")
+    decide(&under_key, key.recipient_message("the recipient")).p_mark_log10.expect("a message was expected")
 }
 
 fn wrong_recipient(found: &Demodulation, key: &SecretKey, number: usize) -> f64 {
     let message = key.recipient_message(&format!("innocent {number}"));
-    decide(found, Some(&message), 1e-6).p_recipient_log10.expect("a message was expected")
+    decide(found, message).p_recipient_log10.expect("a message was expected")
 }
 
 /// How far values are from uniform on [0, 1].

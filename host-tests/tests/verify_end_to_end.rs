@@ -2,6 +2,7 @@
 
 use gdal::spatial_ref::SpatialRef;
 use geo::CoordsIter;
+use meshmark_core::message::Message;
 use meshmark_host_tests::{
     attacks::{Map, deformation, features, reproject, similarity},
     plugin::{Host, library},
@@ -33,6 +34,69 @@ fn the_message_is_read_without_a_record() {
     assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
     assert_eq!(report["message"], message.as_str());
     assert!(report["bit_errors"].is_null() && report["p_value_log10"].is_null());
+}
+
+/// A copy as it was before messages were whitened: its message is what the key whitens to these bits, and its record
+/// says nothing of that.
+fn mark_unwhitened(host: &Host, bits: &str, name: &str) {
+    let message = host.key().unwhitened(&Message::from_hex(bits).unwrap()).to_hex();
+    let (copy, path) = (format!("{name}.gpkg"), format!("{name}.json"));
+    let options = ["KEY=key.json", &format!("MESSAGE={message}"), &format!("RECORD={path}")];
+    let options = options.map(|option| ["-oo", option]);
+    host.run("ogr2ogr", &[&["-f", "GPKG", &copy, "MESHMARK:map.gpkg"][..], options.as_flattened()].concat())
+        .succeeds();
+    let text = std::fs::read(host.path(&path)).unwrap();
+    let mut record: Value = serde_json::from_slice(&text).unwrap();
+    assert_eq!(record["whitened"].take(), true);
+    let fields = record.as_object_mut().unwrap();
+    fields.remove("whitened");
+    fields.insert("message".into(), bits.into());
+    std::fs::write(host.path(&path), record.to_string()).unwrap();
+}
+
+#[test]
+fn a_serial_number_names_its_own_copy_alone() {
+    for digits in [8, 32] {
+        for whitened in [true, false] {
+            let host = Host::new();
+            host.copy("helsinki.gpkg", "map.gpkg");
+            std::fs::create_dir(host.path("records")).unwrap();
+            for number in 1..=3 {
+                let (message, name) = (format!("{number:0digits$x}"), format!("records/{number}"));
+                if !whitened {
+                    mark_unwhitened(&host, &message, &name);
+                    continue;
+                }
+                let options =
+                    ["KEY=key.json".to_string(), format!("MESSAGE={message}"), format!("RECORD={name}.json")];
+                let options = options.each_ref().map(|option| ["-oo", option.as_str()]);
+                let copy = format!("{name}.gpkg");
+                let command = ["-f", "GPKG", copy.as_str(), "MESHMARK:map.gpkg"];
+                host.run("ogr2ogr", &[&command[..], options.as_flattened()].concat()).succeeds();
+            }
+            let suspect = "records/1.gpkg";
+            let of = |how: &[&str]| host.verify("map.gpkg", &[how, &[suspect]].concat());
+            let own = host.matches("map.gpkg", &["--record", "records/1.json", suspect]);
+            assert_eq!(own["message"], format!("{:0digits$x}", 1).as_str());
+            let null = if whitened { "random-message" } else { "any-other-message" };
+            assert_eq!(own["null_hypothesis"], null);
+            for other in ["records/2.json", "records/3.json"] {
+                let (run, report) = of(&["--record", other]);
+                assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")), "{report}");
+                assert!(report["p_value_log10"].as_f64().unwrap() > -3.0, "{report}");
+            }
+            let (_, report) = of(&["--records", "records"]);
+            let p = |entry: &Value| entry["p_value_log10"].as_f64().unwrap();
+            let list = report["candidates"]["list"].as_array().unwrap();
+            assert_eq!(list[0]["record"], "1.json");
+            assert!(p(&list[0]) < -6.0 && list[1..].iter().all(|entry| p(entry) > -3.0), "{list:?}");
+            // Without a record the message may be of either kind.
+            let own = host.matches("map.gpkg", &["--message", &format!("{:0digits$x}", 1), suspect]);
+            assert_eq!(own["null_hypothesis"], null);
+            let (run, _) = of(&["--message", &format!("{:0digits$x}", 2)]);
+            assert_eq!(run.code, Some(1));
+        }
+    }
 }
 
 /// The code and the chip rate of a report or a record.

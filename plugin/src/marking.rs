@@ -129,6 +129,7 @@ impl Marking {
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map()?;
         marking::check_extent(&on_ground, &options.parameters)?;
+        marking::check_scale(&on_ground, map.crs.as_ref())?;
         let message = request.subject.carried(&request.key);
         let pool = pool(threads)?;
         let marked =

@@ -7,6 +7,7 @@ use meshmark_core::{
     key::SecretKey,
     options::{Options, Spelling},
     record::Record,
+    scale::ScaleLattice,
 };
 use meshmark_dataset::{
     CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
@@ -157,11 +158,11 @@ fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
     dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer)
 }
 
-/// Metres on the ground of the reference of a comparison.
-pub fn ground(path: &Path, layers: Option<&[String]>) -> Result<Ground> {
+/// What the reference of a comparison is measured with.
+pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<ScaleLattice>)> {
     let survey =
         reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
-    survey.ground().map_err(|error| of_map("reference", path, &error))
+    survey.into_scales().map_err(|error| of_map("reference", path, &error))
 }
 
 fn of_map(what: &str, path: &Path, error: &meshmark_dataset::Error) -> Error {

@@ -14,7 +14,7 @@ use meshmark_core::{
     code::{Code, Decoder},
     demodulation::Demodulation,
     message::Message,
-    options::{Laplacian, Shape, Subject},
+    options::{Laplacian, Shape},
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -28,10 +28,12 @@ pub struct Report {
     pub verdict: Verdict,
     /// One sentence why.
     pub reason: String,
-    /// The message as decoded, hexadecimal, as MESSAGE would give it; null when nothing was decoded.
+    /// The message as decoded, hexadecimal, in the terms of the expected one; null when nothing was decoded.
     pub message: Option<String>,
-    /// The bits that the code carries for it, hexadecimal: where the key whitens the message, other ones.
+    /// The decoded bits themselves, hexadecimal.
     pub carried_message: Option<String>,
+    /// The message that the key whitens to these bits, hexadecimal: that of a copy marked with MESSAGE.
+    pub unwhitened_message: Option<String>,
     /// Log-likelihood ratios of these bits after decoding, natural logarithm, positive = 1.
     pub bits: Vec<f64>,
     /// How many of these bits differ from those of the expected message.
@@ -140,6 +142,11 @@ impl Report {
         let (found, hypothesis) = (seen.found.as_ref().ok(), request.expected());
         let expected = hypothesis.as_ref().map(|hypothesis| &hypothesis.carried);
         let decoded = found.map(Demodulation::decode);
+        let carried = decoded.as_ref().map(|decoded| &decoded.message);
+        let read = |carried: &Message| match &request.subject {
+            Some(subject) => subject.message_of(carried, &request.key),
+            None => carried.clone(),
+        };
         let tested = found.zip(expected).map(|(found, expected)| found.mark_score(expected));
         let code = CodeEntry {
             name: request.parameters.code,
@@ -157,8 +164,9 @@ impl Report {
             candidates: None,
             decoys: seen.decoys.clone().map(|decoys| Decoys { tested, ..decoys }),
             reason: decision.reason,
-            message: decoded.as_ref().map(|decoded| as_given(request, &decoded.message).to_hex()),
-            carried_message: decoded.as_ref().map(|decoded| decoded.message.to_hex()),
+            message: carried.map(|carried| read(carried).to_hex()),
+            carried_message: carried.map(Message::to_hex),
+            unwhitened_message: carried.map(|carried| request.key.unwhitened(carried).to_hex()),
             expected_carried: expected.map(Message::to_hex),
             null_hypothesis: hypothesis.as_ref().map(|hypothesis| hypothesis.null),
             tried: decision.tried,
@@ -235,10 +243,8 @@ impl Report {
 
     /// What the message is where nothing says whether the key whitened it.
     pub(crate) fn other_reading(&self) -> String {
-        let carried = self.carried_message.as_ref().filter(|_| self.parameters.expected_message.is_none());
-        carried.map_or(String::new(), |carried| {
-            format!(", or {carried} if it is that of a recipient or was not whitened")
-        })
+        let other = self.unwhitened_message.as_ref().filter(|_| self.parameters.expected_message.is_none());
+        other.map_or(String::new(), |other| format!(", or {other} if the copy was marked with MESSAGE"))
     }
 
     /// What LDPC did with the mark that shows, for a person.
@@ -309,12 +315,6 @@ impl ReportParameters {
             software: format!("meshmark {}", env!("CARGO_PKG_VERSION")),
         }
     }
-}
-
-/// The decoded bits as MESSAGE would give them: without an expected message those of a new mark.
-fn as_given(request: &Request, carried: &Message) -> Message {
-    let new = || Subject::Message(carried.clone());
-    request.subject.clone().unwrap_or_else(new).message_of(carried, &request.key)
 }
 
 /// A probability from its logarithm.

@@ -16,11 +16,15 @@ use meshmark_core::{
 use meshmark_dataset::{Dimension, Label, Selection, survey};
 use meshmark_verifier::{
     affine::Affine,
-    decision::{Decision, Verdict, decide, decide_among},
+    decision::{Decision, Expected, Null, Verdict, decide_among},
     matching::Matcher,
     registration::{Registrar, Side, Start},
 };
 use proptest::prelude::*;
+
+fn random(carried: Message) -> Expected {
+    Expected { carried, null: Null::RandomMessage }
+}
 
 /// A marked map with labels on every twentieth vertex.
 struct Case {
@@ -53,10 +57,9 @@ impl Case {
 
     fn map(&self) -> Map<'_> {
         Map {
-            vertices: &self.reference,
             segments: &self.segments,
             polygons: &self.polygons,
-            ground: self.ground,
+            ..Map::of_points(&self.reference, self.ground)
         }
     }
 
@@ -97,7 +100,7 @@ impl Case {
     }
 
     fn decide(&self, found: &Demodulation, message: &Message) -> Decision {
-        decide(found, Some(message), 1e-6)
+        decide_among(found, &random(message.clone()), 1, 1e-6)
     }
 }
 
@@ -146,7 +149,8 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
     let pairs = case.marked.iter().zip(&other.coords);
     let mean: Vec<[f64; 2]> = pairs.map(|(a, b)| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]).collect();
     let found = case.demodulate(&mean, &case.key);
-    let matches = |name: &str| decide_among(&found, &message(name), 1000, 1e-6).verdict == Verdict::Match;
+    let matches =
+        |name: &str| decide_among(&found, &random(message(name)), 1000, 1e-6).verdict == Verdict::Match;
     assert!(matches("ACME GmbH") && matches("Another Ltd"));
     assert!(!(0..998).any(|i| matches(&format!("recipient {i}"))));
 }

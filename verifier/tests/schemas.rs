@@ -76,6 +76,7 @@ fn record() -> Record {
         key_id: "434471506306423b".into(),
         recipient: None,
         message: "095abfcd9510d386660bcc7d0e7b8760".into(),
+        whitened: false,
         amplitude_m: 0.1,
         code: Code::Repetition,
         chip_rate: 2,

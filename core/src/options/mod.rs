@@ -14,7 +14,7 @@ use crate::{
     code::Code,
     key::{RECIPIENT_BITS, SecretKey},
     message::Message,
-    whitening::{unwhiten, whiten},
+    whitening::whiten,
 };
 
 /// What the mark says: a name, or the bits themselves.
@@ -41,7 +41,7 @@ impl Subject {
     /// The message as records and reports have it, of the bits that the code carries.
     pub fn message_of(&self, carried: &Message, key: &SecretKey) -> Message {
         match self {
-            Subject::Message(_) => unwhiten(key, carried),
+            Subject::Message(_) => key.unwhitened(carried),
             Subject::Recipient(_) | Subject::Unwhitened(_) => carried.clone(),
         }
     }

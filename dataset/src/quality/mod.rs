@@ -9,7 +9,7 @@ mod overlaps;
 use crate::Outline;
 use meshmark_core::{
     distortion::{Areas, Hausdorff, Overlaps, Spread, Validity},
-    ground::Ground,
+    scale::Measure,
 };
 use rayon::prelude::*;
 use rstar::{AABB, Envelope};
@@ -92,7 +92,7 @@ pub struct Comparison<'a> {
     /// The geometries after, and what they look like.
     pub after: (Outlines<'a>, &'a State),
     /// Metres per unit.
-    pub ground: Ground,
+    pub measure: Measure<'a>,
     /// The grid of the map after, CRS units; 0 without: overlaps up to a cell of it are slivers.
     pub grid: f64,
 }
@@ -137,6 +137,6 @@ impl Comparison<'_> {
 
     /// Metres per unit at a geometry.
     fn scale(&self, outline: &Outline) -> [f64; 2] {
-        self.ground.metres_per_unit(outline.first().unwrap_or_default())
+        self.measure.metres_per_unit(outline.first().unwrap_or_default())
     }
 }

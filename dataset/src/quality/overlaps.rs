@@ -151,7 +151,7 @@ mod tests {
     use super::*;
     use crate::quality::{Quality, State};
     use gdal::vector::Geometry;
-    use meshmark_core::ground::Ground;
+    use meshmark_core::{ground::Ground, scale::Measure};
     use std::borrow::Cow;
 
     fn outlines(texts: &[String]) -> Vec<Outline> {
@@ -166,7 +166,8 @@ mod tests {
         let before = Outlines { count: before.len(), get: &get_before };
         let after = Outlines { count: after.len(), get: &get_after };
         let (states, ground) = ([before, after].map(State::of), Ground::Plane { metres_per_unit: 1.0 });
-        Comparison { before: (before, &states[0]), after: (after, &states[1]), ground, grid }.quality()
+        let measure = Measure { ground, lattice: None };
+        Comparison { before: (before, &states[0]), after: (after, &states[1]), measure, grid }.quality()
     }
 
     fn square(x: f64, y: f64, size: f64) -> String {

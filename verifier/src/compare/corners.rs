@@ -3,7 +3,7 @@
 use super::{Pair, Pairs};
 use meshmark_core::distortion::angle_deg;
 
-impl Pairs {
+impl Pairs<'_> {
     /// Of every corner where it is and its angle before and after, degrees.
     pub(super) fn corners(&self) -> Vec<([f64; 2], [f64; 2])> {
         let each = |pair: &Pair| {

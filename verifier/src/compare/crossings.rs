@@ -1,7 +1,7 @@
 //! Crossings.
 
 use super::Crossings;
-use meshmark_core::ground::Ground;
+use meshmark_core::scale::Measure;
 use rayon::prelude::*;
 use robust::{Coord, orient2d};
 use rstar::{
@@ -20,12 +20,12 @@ pub(super) fn crossings(
     segments: &[[u32; 2]],
     before: &[[f64; 2]],
     after: &[[f64; 2]],
-    ground: &Ground,
+    measure: &Measure,
 ) -> (Crossings, Vec<[f64; 2]>) {
     let (old, new) = (crossing_pairs(segments, before), crossing_pairs(segments, after));
     let is_deep = |[i, j]: &[u32; 2], coords: &[[f64; 2]]| {
         let ends = [*i, *j].map(|s| segments[s as usize].map(|v| coords[v as usize]));
-        depth_m(ends, ground) > GRAZE_M
+        depth_m(ends, measure) > GRAZE_M
     };
     let counts = Crossings {
         before: old.iter().filter(|pair| is_deep(pair, before)).count(),
@@ -67,9 +67,9 @@ fn cross([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
 }
 
 /// How far the nearest of the four ends of two crossing segments is from the other segment's line.
-fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], ground: &Ground) -> f64 {
+fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], measure: &Measure) -> f64 {
     let height = |a: [f64; 2], b: [f64; 2], p: [f64; 2]| {
-        let ([ex, ey], [px, py]) = (ground.metres_between(a, b), ground.metres_between(a, p));
+        let ([ex, ey], [px, py]) = (measure.metres_between(a, b), measure.metres_between(a, p));
         (ex * py - ey * px).abs() / ex.hypot(ey)
     };
     height(a, b, c).min(height(a, b, d)).min(height(c, d, a)).min(height(c, d, b))

@@ -6,7 +6,7 @@ use crate::{
     inputs::{Digested, digest},
     sketch::{ARROWS, BINS, Extent, Thinning, lines},
 };
-use meshmark_core::{distortion::angle_change_deg, ground::Ground, vertices::VertexTable};
+use meshmark_core::{distortion::angle_change_deg, scale::Measure, vertices::VertexTable};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
@@ -82,7 +82,7 @@ impl Compared {
 pub(super) struct Findings<'a> {
     pub vertices: &'a VertexTable,
     pub moved: &'a [[f64; 2]],
-    pub ground: &'a Ground,
+    pub measure: &'a Measure<'a>,
     pub segments: &'a [[u32; 2]],
     /// Places, and angles before and after.
     pub corners: &'a [([f64; 2], [f64; 2])],
@@ -92,9 +92,9 @@ pub(super) struct Findings<'a> {
 
 impl Findings<'_> {
     pub fn detail(self) -> Detail {
-        let (coords, extent) = (self.vertices.coords(), Extent::of(self.vertices, self.ground));
+        let (coords, extent) = (self.vertices.coords(), Extent::of(self.vertices, &self.measure.ground));
         let pairs = coords.iter().zip(self.moved);
-        let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.ground.metres_between(*a, *b)).collect();
+        let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.measure.metres_between(*a, *b)).collect();
         let lengths: Vec<f64> = displacements.iter().map(|[x, y]| x.hypot(*y)).collect();
         let changes: Vec<f64> = self.corners.iter().map(|(_, angle)| angle_change_deg(*angle)).collect();
         let mut arrows = Thinning::new(&extent, ARROWS);

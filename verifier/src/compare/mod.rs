@@ -12,7 +12,7 @@ use crate::{Error, Result, reading};
 use detail::{Detail, Findings};
 use meshmark_core::{
     distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
-    ground::Ground,
+    scale::Measure,
     vertices::{VertexTable, WIDEST},
 };
 use meshmark_dataset::{
@@ -75,9 +75,9 @@ pub struct Crossings {
 const MOST_AWAY_M: f64 = 100.0;
 
 /// Two maps, feature by feature.
-pub(crate) struct Pairs {
+pub(crate) struct Pairs<'a> {
     pub features: Vec<Pair>,
-    pub ground: Ground,
+    pub measure: Measure<'a>,
     /// The grid of the marked map, CRS units; 0 without.
     pub grid: f64,
 }
@@ -99,7 +99,8 @@ pub fn compare(
     precision: Option<f64>,
     detailed: bool,
 ) -> Result<Comparison> {
-    let ground = reading::ground(reference, layers)?;
+    let (ground, lattice) = reading::scales(reference, layers)?;
+    let measure = Measure { ground, lattice: lattice.as_ref() };
     let (before, own) = reading::geometries("reference", reference, layers)?;
     let (after, other) = reading::geometries("marked map", marked, layers)?;
     if before.len() != after.len() {
@@ -119,7 +120,7 @@ pub fn compare(
     }
     let places = before.iter().zip(&after).find_map(|(a, b)| a.outline.first().zip(b.outline.first()));
     let away_m = places
-        .map_or(0.0, |(from, to)| ground.metres_between(from, to).iter().fold(0.0, |a: f64, b| a.hypot(*b)));
+        .map_or(0.0, |(from, to)| measure.metres_between(from, to).iter().fold(0.0, |a: f64, b| a.hypot(*b)));
     if let (Some(own), Some(other), true) = (own, other, away_m > MOST_AWAY_M)
         && !own.is_same(&other)
     {
@@ -130,7 +131,7 @@ pub fn compare(
         )));
     }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
-    Ok(Pairs { features, ground, grid: precision.unwrap_or(0.0) }.compare(detailed))
+    Ok(Pairs { features, measure, grid: precision.unwrap_or(0.0) }.compare(detailed))
 }
 
 fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
@@ -146,7 +147,7 @@ fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
     Ok(Pair { before: before.outline, after: after.outline })
 }
 
-impl Pairs {
+impl Pairs<'_> {
     fn compare(&self, detailed: bool) -> Comparison {
         let all = |map: fn(&Pair) -> &Outline| {
             self.features.iter().flat_map(move |pair| map(pair).chains.iter().flatten().copied())
@@ -165,7 +166,7 @@ impl Pairs {
         let angles: Vec<[f64; 2]> = corners.iter().map(|(_, angle)| *angle).collect();
         let Quality { areas, hausdorff, validity, overlaps, newly_invalid, newly_overlapping } =
             self.quality();
-        let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, &self.ground);
+        let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, &self.measure);
         let detail = detailed.then(|| {
             let torn = vertices.coords().iter().zip(&torn).filter(|(_, torn)| **torn);
             let place = |number: &u32| self.features[*number as usize].before.first();
@@ -174,7 +175,7 @@ impl Pairs {
             Findings {
                 vertices: &vertices,
                 moved: &moved,
-                ground: &self.ground,
+                measure: &self.measure,
                 segments: &segments,
                 corners: &corners,
                 places: [torn.map(|(at, _)| *at).collect(), invalid, overlapping, crossing],
@@ -188,7 +189,7 @@ impl Pairs {
                 vertices: vertices.len(),
                 torn_vertices: torn.into_iter().filter(|torn| *torn).count(),
             },
-            displacement: Displacement::between(&vertices, &moved, &self.ground),
+            displacement: Displacement::between(&vertices, &moved, &self.measure),
             hausdorff,
             angles: AngleChange::of(&angles),
             areas,
@@ -223,7 +224,7 @@ impl Pairs {
         quality::Comparison {
             before: (before, &was),
             after: (after, &is),
-            ground: self.ground,
+            measure: self.measure,
             grid: self.grid,
         }
         .quality()
@@ -231,6 +232,6 @@ impl Pairs {
 
     /// Metres per unit at a geometry.
     fn scale(&self, geometry: &Outline) -> [f64; 2] {
-        self.ground.metres_per_unit(geometry.first().unwrap_or_default())
+        self.measure.metres_per_unit(geometry.first().unwrap_or_default())
     }
 }

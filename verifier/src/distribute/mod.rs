@@ -176,6 +176,7 @@ fn run(
     let map = survey.map().map_err(of_map)?;
     let parameters = &options.parameters;
     marking::check_extent(&map, parameters).map_err(of_map)?;
+    marking::check_scale(&map, survey.crs.as_ref()).map_err(of_map)?;
     let threads = threads();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
