@@ -25,7 +25,7 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError, Survey,
+    Error as MapError, Survey, ThreadPool,
     formats::Format,
     marking::{self, Unmarked},
     parse_srs, threads,
@@ -177,7 +177,7 @@ fn run(
     let parameters = &options.parameters;
     marking::check_extent(&map, parameters).map_err(of_map)?;
     let threads = threads();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = ThreadPool::new(threads, || (), || ());
     let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
     progress.start("patches", 0);
     let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
