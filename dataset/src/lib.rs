@@ -19,6 +19,7 @@ pub mod read_back;
 mod shapes;
 mod survey;
 mod threads;
+mod turns;
 pub mod wkb;
 pub mod workplace;
 

@@ -201,6 +201,14 @@ impl Marking {
         })
     }
 
+    /// Fails when a layer that was read to its end has given another number of features than were marked.
+    pub fn check_count(&self, layer: String, number: usize, came: u64) -> Result<()> {
+        match self.map.features.get(&number) {
+            Some(&marked) if marked != came => Err(Error::OtherCount { layer, marked, came }),
+            _ => Ok(()),
+        }
+    }
+
     /// Fails when the source's files are not those that were marked.
     pub fn check_source(&self) -> Result<()> {
         self.files.check()

@@ -133,7 +133,8 @@ fn stage(
 ) -> Result<Staged> {
     progress.start("copying", 0);
     let staged = workplace.folder().join("staged.gpkg");
-    let options = ["-lco", "SPATIAL_INDEX=YES", "-oo", reading::COLUMNS_OF_CSV];
+    let mut options = vec!["-lco", "SPATIAL_INDEX=YES"];
+    options.extend(marking::OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]));
     ogr2ogr::copy("GPKG", &request.map, &staged, &options)?.iter().for_each(|text| warn(text));
     let (again, layers) = reading::staged(&staged, &request.options)?;
     if again.vertices.digest() != map.vertices.digest() {
