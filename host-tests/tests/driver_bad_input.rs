@@ -129,8 +129,9 @@ fn a_map_that_is_too_small_is_told_which_patch_size_fits() {
 #[test]
 fn a_failure_right_after_the_threads_began_is_one_message_however_they_end() {
     let host = Host::new();
-    write_points(&host, "few.geojson", (0..100).map(|i| format!("[{i}, {}]", i * i % 101)));
+    write_points(&host, "few.geojson", (0..100).map(|i| format!("{i}, {}", i * i % 101)));
     let source = [
+        "-ro",
         "-q",
         "MESHMARK:few.geojson",
         "-oo",
