@@ -1,6 +1,6 @@
 //! Geometries one by one, for comparing two maps feature by feature.
 
-use crate::{Error, Outline, Result, survey::chosen_layers};
+use crate::{Error, Outline, Result, survey::chosen_layers, turns::turn};
 use gdal::{Dataset, vector::LayerAccess};
 
 /// One geometry of a dataset.
@@ -27,6 +27,7 @@ pub fn features(
 ) -> Result<Vec<FeatureGeometry>> {
     let mut all = Vec::new();
     for (index, name) in chosen_layers(dataset, layers)? {
+        let _turn = turn(dataset, &name)?;
         let mut layer = dataset.layer(index)?;
         let columns = layer.defn().geom_fields().count();
         for feature in layer.features() {

@@ -19,6 +19,7 @@ pub mod read_back;
 mod shapes;
 mod survey;
 mod threads;
+mod turns;
 pub mod wkb;
 pub mod workplace;
 
@@ -33,6 +34,6 @@ pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
 
-pub use threads::threads;
+pub use threads::{ThreadPool, threads};
 
 pub use survey::{LabelFields, Selection, Survey, Target, survey};

@@ -3,6 +3,7 @@
 use crate::{
     CoordinateSystem, Error, Geometries, Result, Survey,
     quality::{Comparison, Outlines, Quality, State},
+    turns::turn,
     wkb,
 };
 use gdal::{
@@ -133,9 +134,17 @@ pub fn warnings(
     warnings
 }
 
+/// How any map is opened. CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked; of
+/// OpenStreetMap files layers must be read one at a time, whatever the configuration says. With @ an option concerns
+/// only drivers that have it.
+pub const OPEN_OPTIONS: [&str; 2] = ["@KEEP_GEOM_COLUMNS=NO", "@INTERLEAVED_READING=NO"];
+
 /// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
 pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
-    let find = |mut layer: Layer| Some((layer.name(), attribute_of_wkt(&mut layer)?));
+    let find = |mut layer: Layer| {
+        let _turn = turn(dataset, &layer.name()).ok()?;
+        Some((layer.name(), attribute_of_wkt(&mut layer)?))
+    };
     let (layer, attribute) = dataset.layers().find_map(find)?;
     Some(format!(
         "layer \"{layer}\" has coordinates as text in its attribute \"{attribute}\", which stays as it is: with it \

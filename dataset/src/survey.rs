@@ -2,6 +2,7 @@
 
 use crate::{
     CoordinateSystem, Error, Geometries, Label, Result, Shape, crs, labels, parse_srs, shapes,
+    turns::turn,
     wkb::{self, Step},
 };
 use gdal::{
@@ -101,6 +102,8 @@ pub struct Survey {
     pub shapes: Vec<Shape>,
     /// The geometries in the order they were read, if they were asked for.
     pub geometries: Option<Geometries>,
+    /// How many features each layer that was read has, by the layer's number in the dataset.
+    pub features: BTreeMap<usize, u64>,
 }
 
 impl Survey {
@@ -145,6 +148,7 @@ impl Survey {
             labels,
             shapes,
             geometries: None,
+            features: self.features.clone(),
         })
     }
 
@@ -184,8 +188,10 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let chosen = chosen_layers(dataset, selection.layers)?;
     let mut walk =
         Walk { selection, crs: None, chains: Chains::default(), labels: Vec::new(), shapes: Vec::new() };
+    let mut features = BTreeMap::new();
     for (index, name) in &chosen {
-        walk.layer(&mut dataset.layer(*index)?, name)?;
+        let _turn = turn(dataset, name)?;
+        features.insert(*index, walk.layer(&mut dataset.layer(*index)?, name)?);
     }
     let crs = match selection.target {
         Target::Crs(target) => Some(target.clone()),
@@ -203,7 +209,7 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let lattice = crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&vertices, ground));
     let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
     let (labels, shapes) = (walk.labels, walk.shapes);
-    Ok(Survey { vertices, segments, polygons, crs, ground, lattice, labels, shapes, geometries })
+    Ok(Survey { vertices, segments, polygons, crs, ground, lattice, labels, shapes, geometries, features })
 }
 
 /// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
@@ -299,11 +305,14 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<()> {
+    /// Reads a layer; how many features it has.
+    fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<u64> {
         let columns = self.columns(layer)?;
         let (first_label, first_shape) = (self.labels.len(), self.shapes.len());
         let mut of_column = vec![Chains::default(); columns.len()];
+        let mut features = 0;
         for feature in layer.features() {
+            features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
                 read_geometry(&feature, column, name, self.selection.geometries, chains)?;
             }
@@ -334,7 +343,7 @@ impl Walk<'_> {
                 reproject(&mut shape.vertices, crs.as_ref(), target, name)?;
             }
         }
-        Ok(())
+        Ok(features)
     }
 
     /// Labels and shapes of a feature. Curves have no counterpart in geo and give none.

@@ -14,6 +14,7 @@ use meshmark_core::{
     carrier::{Carrier, bit_of_coefficient},
     demodulation::Demodulation,
     key::SecretKey,
+    message::Message,
     options::Parameters,
 };
 use meshmark_verifier::{

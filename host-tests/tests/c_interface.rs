@@ -397,6 +397,25 @@ fn a_vertex_that_came_after_marking_ends_reading_with_a_failure() {
 }
 
 #[test]
+fn a_feature_that_went_after_marking_is_missed_at_the_end_of_its_layer() {
+    let host = Host::new();
+    let source = in_memory("kotka.gpkg");
+    let result = filter(&host, source.c_dataset(), &[]).unwrap();
+    let mut layer = result.layer_by_name("roads").unwrap();
+    let mut read = || quiet(|| (layer.features().count(), last_failure()));
+    assert_eq!(read(), (110, None));
+    let own = source.layer_by_name("roads").unwrap();
+    // SAFETY: the layer is open.
+    assert_eq!(unsafe { gdal_sys::OGR_L_DeleteFeature(c_layer(&own), 4) }, gdal_sys::OGRErr::OGRERR_NONE);
+    let (count, failure) = read();
+    assert_eq!(count, 109);
+    let failure = failure.expect("a failure, not a layer that is said to be whole");
+    assert!(failure.contains("layer \"roads\" has 110 features, and 109 of them came out"), "{failure}");
+    layer.set_attribute_filter("FID <> 5").unwrap();
+    assert_eq!(quiet(|| (layer.features().count(), last_failure())), (108, None), "a filter drops features");
+}
+
+#[test]
 fn a_file_that_changes_after_marking_is_noticed() {
     let host = Host::new();
     host.copy("kotka.gpkg", "map.gpkg");

@@ -127,6 +127,28 @@ fn a_map_that_is_too_small_is_told_which_patch_size_fits() {
 }
 
 #[test]
+fn a_failure_right_after_the_threads_began_is_one_message_however_they_end() {
+    let host = Host::new();
+    write_points(&host, "few.geojson", (0..100).map(|i| format!("{i}, {}", i * i % 101)));
+    let source = [
+        "-ro",
+        "-q",
+        "MESHMARK:few.geojson",
+        "-oo",
+        "KEY=key.json",
+        "-oo",
+        "RECIPIENT=ACME",
+        "-oo",
+        "SRS=EPSG:3067",
+    ];
+    for _ in 0..40 {
+        let run = host.run("ogrinfo", &source);
+        assert!(run.errors().len() == 1 && run.errors()[0].contains("PATCH_SIZE"), "{}", run.stderr);
+        assert!(!run.stderr.contains("TLS") && !run.stderr.contains("ErrorHandler"), "{}", run.stderr);
+    }
+}
+
+#[test]
 fn a_message_that_is_too_long_for_the_patches_is_told_what_fits() {
     let host = Host::new();
     let words =

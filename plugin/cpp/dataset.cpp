@@ -2,12 +2,15 @@
 
 #include "shim.h"
 
+constexpr const char *DRIVER_OF_TURNS = "OSM";
+
 MeshmarkDataset::MeshmarkDataset(GDALDataset *source, MeshmarkMarking *marking)
-    : m_source(source), m_marking(marking)
+    : m_source(source), m_readsInTurn(source->GetDriver() && EQUAL(source->GetDriverName(), DRIVER_OF_TURNS)),
+      m_marking(marking)
 {
     poDriver = GetGDALDriverManager()->GetDriverByName(MESHMARK_DRIVER);
     for (int i = 0; i < source->GetLayerCount(); i++)
-        m_layers.push_back(std::make_unique<MeshmarkLayer>(*this, *source->GetLayer(i), marking));
+        m_layers.push_back(std::make_unique<MeshmarkLayer>(*this, *source->GetLayer(i), i, marking));
 }
 
 MeshmarkDataset::~MeshmarkDataset()
@@ -17,6 +20,7 @@ MeshmarkDataset::~MeshmarkDataset()
 
 int MeshmarkDataset::CloseDependentDatasets()
 {
+    EndTurn();
     m_layers.clear();
     GDALDataset *source = m_source;
     m_source = nullptr;
@@ -38,6 +42,41 @@ int MeshmarkDataset::TestCapability(const char *capability) MESHMARK_CONST
             return m_source && m_source->TestCapability(capability);
     }
     return FALSE;
+}
+
+// While a query is open, the source starts anew and makes features of the query's layers only. Without, it keeps those of
+// all other layers until somebody reads them, and gives up when they are many. With its own dataset-wide reading, ogr2ogr
+// would take a failure for the end.
+bool MeshmarkDataset::GiveTurn(MeshmarkLayer &layer, bool starts)
+{
+    if (!m_readsInTurn || m_turnOf == &layer)
+        return true;
+    if (!starts)
+    {
+        CPLError(CE_Failure, CPLE_AppDefined, "layer \"%s\" cannot be read further, as another layer was begun meanwhile: "
+                 "read the layers of this format one after the other", layer.GetName());
+        return false;
+    }
+    EndTurn();
+    const std::string query = std::string("SELECT * FROM \"") + layer.GetName() + "\"";
+    m_turn = m_source->ExecuteSQL(query.c_str(), nullptr, nullptr);
+    m_turnOf = m_turn ? &layer : nullptr;
+    layer.ApplyFiltersToSource(); // the end of the last query has cleared them
+    return m_turn != nullptr;
+}
+
+void MeshmarkDataset::EndTurn()
+{
+    if (m_turn)
+        m_source->ReleaseResultSet(m_turn);
+    m_turn = nullptr;
+    m_turnOf = nullptr;
+}
+
+void MeshmarkDataset::EndTurnOf(const MeshmarkLayer &layer)
+{
+    if (m_turnOf == &layer)
+        EndTurn();
 }
 
 std::vector<std::string> MeshmarkDataset::GetFieldDomainNames(CSLConstList options) const

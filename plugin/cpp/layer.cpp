@@ -10,8 +10,8 @@ constexpr int FEATURES_BETWEEN_CHECKS = 256;
 // The metadata domain in which GDAL keeps members of a GeoJSON file, "bbox" among them.
 constexpr const char *NATIVE_DATA = "NATIVE_DATA";
 
-MeshmarkLayer::MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, const MeshmarkMarking *marking)
-    : m_dataset(dataset), m_source(source), m_marking(marking),
+MeshmarkLayer::MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, int number, const MeshmarkMarking *marking)
+    : m_dataset(dataset), m_source(source), m_number(number), m_marking(marking),
       m_marked(source.GetLayerDefn()->GetGeomFieldCount() > 0 && meshmark_marks_layer(marking, source.GetName()))
 {
     SetDescription(source.GetName());
@@ -50,8 +50,13 @@ const char *MeshmarkLayer::GetMetadataItem(const char *name, const char *domain)
 
 void MeshmarkLayer::ResetReading()
 {
-    m_source.ResetReading();
+    if (m_dataset.ReadsInTurn())
+        m_dataset.EndTurnOf(*this);
+    else
+        m_source.ResetReading();
     m_ended = false;
+    m_fromStart = true;
+    m_came = 0;
     m_untilCheck = 0;
 }
 
@@ -73,7 +78,11 @@ OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
 {
     if (m_ended)
         return nullptr;
-    OGRFeatureUniquePtr feature(m_source.GetNextFeature());
+    const auto errors = CPLGetErrorCounter();
+    OGRFeatureUniquePtr feature;
+    if (m_dataset.GiveTurn(*this, m_came == 0))
+        feature.reset(m_source.GetNextFeature());
+    const bool failed = CPLGetErrorCounter() != errors && CPLGetLastErrorType() == CE_Failure;
     bool good = true;
     if (!feature || m_untilCheck-- == 0)
     {
@@ -81,13 +90,29 @@ OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
         m_untilCheck = FEATURES_BETWEEN_CHECKS;
     }
     if (feature && good && Mark(*feature))
+    {
+        m_came++;
         return feature;
+    }
     m_ended = true;
+    m_dataset.EndTurnOf(*this);
+    if (!feature && good && !failed)
+        CheckEnd();
     return nullptr;
+}
+
+// As many features come out as were marked.
+void MeshmarkLayer::CheckEnd() const
+{
+    const bool is_filtered = !m_readsAll && (m_poFilterGeom || m_pszAttrQueryString);
+    if (m_fromStart && !is_filtered)
+        meshmark_is_complete(m_marking, m_source.GetName(), m_number, m_came);
 }
 
 OGRFeature *MeshmarkLayer::GetFeature(GIntBig fid)
 {
+    if (m_dataset.ReadsInTurn())
+        return OGRLayer::GetFeature(fid);
     OGRFeatureUniquePtr feature(m_source.GetFeature(fid));
     if (!feature || !meshmark_source_is_unchanged(m_marking) || !Mark(*feature))
         return nullptr;
@@ -97,9 +122,9 @@ OGRFeature *MeshmarkLayer::GetFeature(GIntBig fid)
 
 OGRErr MeshmarkLayer::SetNextByIndex(GIntBig index)
 {
-    if (!SourceFilters())
+    if (!SourceFilters() || m_dataset.ReadsInTurn())
         return OGRLayer::SetNextByIndex(index);
-    m_ended = false;
+    m_ended = m_fromStart = false;
     return m_source.SetNextByIndex(index);
 }
 
@@ -209,6 +234,15 @@ void MeshmarkLayer::ApplySpatialFilterToSource()
         y += rounding(e.MinY, e.MaxY);
         m_source.SetSpatialFilterRect(field, e.MinX - x, e.MinY - y, e.MaxX + x, e.MaxY + y);
     }
+}
+
+void MeshmarkLayer::ApplyFiltersToSource()
+{
+    if (m_readsAll)
+        return;
+    if (m_pszAttrQueryString && !m_evaluatesGeometry)
+        m_source.SetAttributeFilter(m_pszAttrQueryString);
+    ApplySpatialFilterToSource();
 }
 
 bool MeshmarkLayer::HasStraightEdges(int field) const
@@ -349,6 +383,7 @@ bool MeshmarkLayer::MeasureExtents()
     m_source.SetIgnoredFields(nullptr);
     m_source.SetAttributeFilter(nullptr);
     SetFilter(m_source, m_iGeomFieldFilter, nullptr);
+    m_readsAll = true;
     ResetReading();
     CPLErrorReset();
     while (auto feature = ReadNext())
@@ -364,9 +399,8 @@ bool MeshmarkLayer::MeasureExtents()
         }
     }
     const bool complete = CPLGetLastErrorType() != CE_Failure;
-    if (m_pszAttrQueryString && !m_evaluatesGeometry)
-        m_source.SetAttributeFilter(m_pszAttrQueryString);
-    ApplySpatialFilterToSource();
+    m_readsAll = false;
+    ApplyFiltersToSource();
     ResetReading();
     if (complete)
         m_extents = std::move(extents);

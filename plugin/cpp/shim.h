@@ -55,6 +55,9 @@ extern "C"
     // False and a failure when the source's files are no longer those that were marked.
     bool meshmark_source_is_unchanged(const MeshmarkMarking *);
 
+    // False and a failure when layer number `number` has not given as many features as it had when it was marked.
+    bool meshmark_is_complete(const MeshmarkMarking *, const char *layer, int number, uint64_t features);
+
     // Whether writing to `name` would destroy the source of an open marked dataset.
     bool meshmark_is_being_read(const char *name);
     // Says that it is being read, and first saves a copy if something may write to it all the same.
@@ -105,7 +108,7 @@ class MeshmarkDataset;
 class MeshmarkLayer final : public OGRLayer
 {
   public:
-    MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, const MeshmarkMarking *marking);
+    MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, int number, const MeshmarkMarking *marking);
 
     void ResetReading() override;
     OGRFeature *GetNextFeature() override;
@@ -141,8 +144,12 @@ class MeshmarkLayer final : public OGRLayer
     OGRStyleTable *GetStyleTable() override { return m_source.GetStyleTable(); }
     GDALDataset *GetDataset() override;
 
+    // Gives the source's layer the filters and ignored fields of this one.
+    void ApplyFiltersToSource();
+
   private:
     OGRFeatureUniquePtr ReadNext();
+    void CheckEnd() const;
     bool Mark(OGRFeature &feature);
     bool MarkGeometry(OGRFeature &feature, int field);
     bool PassesFilters(OGRFeature &feature);
@@ -159,10 +166,14 @@ class MeshmarkLayer final : public OGRLayer
 
     MeshmarkDataset &m_dataset;
     OGRLayer &m_source;
+    const int m_number;
     const MeshmarkMarking *const m_marking;
     const bool m_marked;
     bool m_evaluatesGeometry = false; // the attribute filter does
+    bool m_readsAll = false;          // whatever the filters
     bool m_ended = false;
+    bool m_fromStart = true; // no reader has jumped to a feature
+    uint64_t m_came = 0;     // features of the source since the last reset
     int m_untilCheck = 0;
     CPLStringList m_ignored;                // as the user gave them
     std::vector<int> m_ignoredButRead;      // geometry fields among them that a filter needs
@@ -182,6 +193,13 @@ class MeshmarkDataset final : public GDALDataset
     bool IsLayerPrivate(int index) const override { return m_source && m_source->IsLayerPrivate(index); }
     int TestCapability(const char *capability) MESHMARK_CONST override;
 
+    // Whether the source makes features of all layers in one pass over its file, so that only one can be read at a time.
+    bool ReadsInTurn() const { return m_readsInTurn; }
+    // Lets a layer be read from its start, or further; false and a failure when another one has been begun since.
+    bool GiveTurn(MeshmarkLayer &layer, bool starts);
+    void EndTurn();
+    void EndTurnOf(const MeshmarkLayer &layer);
+
     // Handed on as they are.
     std::vector<std::string> GetFieldDomainNames(CSLConstList options) const override;
     const OGRFieldDomain *GetFieldDomain(const std::string &name) const override;
@@ -197,6 +215,9 @@ class MeshmarkDataset final : public GDALDataset
 
   private:
     GDALDataset *m_source;
+    const bool m_readsInTurn;
+    const MeshmarkLayer *m_turnOf = nullptr;
+    OGRLayer *m_turn = nullptr; // an open query, see GiveTurn
     std::unique_ptr<MeshmarkMarking, MeshmarkFree> m_marking;
     std::vector<std::unique_ptr<MeshmarkLayer>> m_layers;
 };

@@ -29,6 +29,12 @@ pub enum Error {
          the source was changed while it was read, open it again"
     )]
     UnknownVertex { layer: String, fid: i64, x: f64, y: f64 },
+    #[error(
+        "layer \"{layer}\" has {marked} features, and {came} of them came out: the source was changed while it was \
+         read, or cannot be read twice; open it again, or convert it to a GeoPackage first (ogr2ogr -f GPKG), and mark \
+         that"
+    )]
+    OtherCount { layer: String, marked: u64, came: u64 },
     #[error("layer \"{layer}\", feature {fid}: {reason}")]
     Geometry { layer: String, fid: i64, reason: String },
     #[error("the output {path} is the source itself: write the marked map to another place")]

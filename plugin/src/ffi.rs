@@ -157,6 +157,21 @@ unsafe extern "C" fn meshmark_source_is_unchanged(marking: *const Marking) -> bo
 }
 
 #[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_is_complete(
+    marking: *const Marking,
+    layer: *const c_char,
+    number: i32,
+    features: u64,
+) -> bool {
+    guarded(false, || {
+        // SAFETY: the shim gives a marking that it holds and a C string.
+        let (marking, layer) = unsafe { (&*marking, text(layer)) };
+        let complete = marking.check_count(layer, number as usize, features);
+        complete.map_err(|error| fail(&marking.name, &error)).is_ok()
+    })
+}
+
+#[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_is_being_read(name: *const c_char) -> bool {
     // SAFETY: the shim gives a C string.
     guarded(false, || is_being_read(Path::new(&unsafe { text(name) })))

@@ -9,6 +9,7 @@ use crate::{
 };
 use gdal::{Dataset, GdalOpenFlags};
 use gdal_sys::{GDALDatasetH, OGRLayerH};
+use meshmark_dataset::marking::OPEN_OPTIONS;
 use std::{
     ffi::{CStr, CString, c_char, c_void},
     mem::ManuallyDrop,
@@ -43,9 +44,8 @@ impl OwnedSource {
         let flags = GdalOpenFlags::GDAL_OF_VECTOR
             | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR
             | GdalOpenFlags::GDAL_OF_INTERNAL;
-        // CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked. With @ the
-        // option concerns only drivers that know it.
-        let options = [c"@KEEP_GEOM_COLUMNS=NO".as_ptr(), ptr::null()];
+        let options = OPEN_OPTIONS.map(|option| CString::new(option).expect("it has no NUL"));
+        let options: Vec<_> = options.iter().map(|option| option.as_ptr()).chain([ptr::null()]).collect();
         // SAFETY: the name is a C string; null lists mean all drivers and no sibling files, the options end in null.
         let handle = unsafe {
             gdal_sys::GDALOpenEx(c_name.as_ptr(), flags.bits(), ptr::null(), options.as_ptr(), ptr::null())

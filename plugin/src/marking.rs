@@ -14,7 +14,7 @@ use meshmark_core::{
     patches::Patches,
 };
 use meshmark_dataset::{
-    LabelFields, MOST_VERTICES, Selection, Survey, Target,
+    LabelFields, MOST_VERTICES, Selection, Survey, Target, ThreadPool,
     marking::{self, Moves, Unmarked},
     same_file, survey,
 };
@@ -78,10 +78,9 @@ impl Request {
     }
 }
 
-fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+fn pool(threads: usize) -> Result<ThreadPool> {
     // GEOS says what it does not like about invalid geometries, on the thread that asks it.
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
-    let pool = builder.start_handler(|_| ffi_errors::hush()).exit_handler(|_| ffi_errors::unhush()).build();
+    let pool = ThreadPool::new(threads, ffi_errors::hush, ffi_errors::unhush);
     pool.map_err(|error| Error::Threads(error.to_string()))
 }
 
@@ -201,6 +200,14 @@ impl Marking {
         moves.fold([0.0; 2], |reach: [f64; 2], (from, to)| {
             [0, 1].map(|axis| reach[axis].max((to[axis] - from[axis]).abs()))
         })
+    }
+
+    /// Fails when a layer that was read to its end has given another number of features than were marked.
+    pub fn check_count(&self, layer: String, number: usize, came: u64) -> Result<()> {
+        match self.map.features.get(&number) {
+            Some(&marked) if marked != came => Err(Error::OtherCount { layer, marked, came }),
+            _ => Ok(()),
+        }
     }
 
     /// Fails when the source's files are not those that were marked.

@@ -111,10 +111,6 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, &dataset, reading, Target::Own)
 }
 
-/// CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked. With @ the open option
-/// concerns only drivers that know it.
-pub(crate) const COLUMNS_OF_CSV: &str = "@KEEP_GEOM_COLUMNS=NO";
-
 /// Reads the vertices of a map to be marked.
 pub(crate) fn source(path: &Path, options: &Options, warn: &mut dyn FnMut(&str)) -> Result<Survey> {
     if path.as_os_str().as_encoded_bytes().get(..9).is_some_and(|p| p.eq_ignore_ascii_case(b"MESHMARK:")) {
@@ -333,10 +329,11 @@ fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dat
         )));
     }
     forget_failure();
+    let mut open_options = marking::OPEN_OPTIONS.to_vec();
+    open_options.push("@WRITE_GFS=NO"); // a map that is read leaves nothing beside it
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
-        // A map that is read leaves nothing beside it.
-        open_options: Some(&[COLUMNS_OF_CSV, "@WRITE_GFS=NO"]),
+        open_options: Some(&open_options),
         allowed_drivers,
         ..Default::default()
     };

@@ -25,7 +25,7 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError, Survey,
+    Error as MapError, Survey, ThreadPool,
     formats::Format,
     marking::{self, Unmarked},
     parse_srs, threads,
@@ -133,7 +133,8 @@ fn stage(
 ) -> Result<Staged> {
     progress.start("copying", 0);
     let staged = workplace.folder().join("staged.gpkg");
-    let options = ["-lco", "SPATIAL_INDEX=YES", "-oo", reading::COLUMNS_OF_CSV];
+    let mut options = vec!["-lco", "SPATIAL_INDEX=YES"];
+    options.extend(marking::OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]));
     ogr2ogr::copy("GPKG", &request.map, &staged, &options)?.iter().for_each(|text| warn(text));
     let (again, layers) = reading::staged(&staged, &request.options)?;
     if again.vertices.digest() != map.vertices.digest() {
@@ -178,7 +179,7 @@ fn run(
     marking::check_extent(&map, parameters).map_err(of_map)?;
     marking::check_scale(&map, survey.crs.as_ref()).map_err(of_map)?;
     let threads = threads();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = ThreadPool::new(threads, || (), || ());
     let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
     progress.start("patches", 0);
     let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
