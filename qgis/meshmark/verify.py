@@ -92,11 +92,8 @@ class Verify(Algorithm):
         self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of error, its decimal logarithm")))
         self.addOutput(QgsProcessingOutputNumber("MATCHED_VERTICES", tr("Matched vertices")))
 
-    def checkParameterValues(self, given, context):
-        ok, message = super().checkParameterValues(given, context)
-        if ok and not self._marks(given, context):
-            return False, tr("Give a record, or a folder of records.")
-        return ok, message
+    def objection(self, given, context):
+        return None if self._marks(given, context) else tr("Give a record, or a folder of records.")
 
     def _marks(self, given, context):
         """The option that names the record, or the folder of records."""
