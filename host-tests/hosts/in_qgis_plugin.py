@@ -1,6 +1,8 @@
 """Runs the plugin's algorithms on layers that are no plain files, and cancels: qgis_plugin.sh verifies the copies."""
 
+import json
 import os
+import subprocess
 import sys
 import threading
 from unittest import mock
@@ -262,6 +264,21 @@ def older_file_is_no_copy():
     print("passed: qgis_plugin: what this run did not make is no copy", flush=True)
 
 
+def figures_are_per_cent():
+    import processing
+
+    maps = {"ORIGINAL": f"{HERE}/records/older.reference.gpkg", "MARKED": f"{HERE}/older.gpkg"}
+    feedback = QgsProcessingFeedback(False)
+    found = processing.run("meshmark:compare", {**maps, "REPORT": None}, feedback=feedback)
+    command = [commands.meshmark(), "compare", "--json", *maps.values()]
+    shares = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    kept = found["RIGHT_ANGLES_KEPT_PERCENT"]
+    assert abs(kept - 100 * shares["angles"]["right_angles_kept"]) < 1e-9 and kept > 1, kept
+    assert abs(found["AREA_MAX_CHANGE_PERCENT"] - 100 * shares["areas"]["max_change"]) < 1e-9, found
+    assert f"Right angles kept within 1 degree: {kept:.3g} %" in feedback.textLog(), feedback.textLog()
+    print("passed: qgis_plugin: shares are given as per cent", flush=True)
+
+
 def model(has_output, recipient="ACME GmbH"):
     """Export, then verify what was exported."""
 
@@ -342,4 +359,5 @@ verify_what_a_layer_shows()
 verify_again()
 run_in_a_model()
 older_file_is_no_copy()
+figures_are_per_cent()
 fail_without_a_trace()
