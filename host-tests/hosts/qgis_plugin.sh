@@ -143,6 +143,8 @@ for copy in memory filtered degrees joined; do
     verify "a copy of layers, $copy" "records/$copy.reference.gpkg" "$copy.gpkg" --record "records/$copy.json"
 done
 
+timeout 300 "${python[@]}" "$hosts/in_qgis_dialogs.py" "$profile/python/plugins" 2>"$work/log" || fail "$(cat "$work/log")"
+
 # In QGIS itself.
 mkdir "$work/desktop" "$work/desktop/records" "$work/pictures"
 cp "$fixture" "$work/desktop/map.gpkg"

@@ -60,6 +60,11 @@ class Algorithm(QgsProcessingAlgorithm):
         # The framework owns it from here on.
         self.addParameter(parameter)
 
+    def createCustomParametersWidget(self, parent=None):
+        from .dialog import Dialog
+
+        return Dialog(self, parent=parent)
+
     def canExecute(self):
         try:
             self.needs()
