@@ -13,8 +13,8 @@ from processing.gui.AlgorithmDialog import AlgorithmDialog
 from qgis.core import QgsApplication, QgsProject, QgsSettings
 from qgis.PyQt.QtCore import QTimer
 from qgis.PyQt.QtGui import QColor
-from qgis.PyQt.QtWidgets import QApplication, QDockWidget, QToolBar
-from qgis.utils import iface
+from qgis.PyQt.QtWidgets import QApplication, QDockWidget, QToolBar, QToolButton
+from qgis.utils import iface, reloadPlugin
 
 WORK, PICTURES = os.environ["MESHMARK_WORK"], os.environ["MESHMARK_PICTURES"]
 # For a dialog to open, and for a run to end, seconds.
@@ -56,6 +56,22 @@ def context_menu_entry():
     entries = [action for action in menu.actions() if action.text() == "Export with watermark…"]
     assert len(entries) == 1, [action.text() for action in menu.actions()]
     return entries[0]
+
+
+def is_in_menu_and_toolbar():
+    """Once, also after the plugin was loaded again; and the entries work."""
+    assert reloadPlugin("meshmark")
+    entries = ["Export with watermark…", "Verify suspect map…", "Compare original and marked map…", "New key…"]
+    submenus = [a.menu() for a in iface.pluginMenu().actions() if a.menu() and a.text().replace("&", "") == "meshmark"]
+    assert [[a.text() for a in menu.actions()] for menu in submenus] == [entries], submenus
+    buttons = [b for b in iface.mainWindow().findChildren(QToolButton) if b.defaultAction() in submenus[0].actions()]
+    assert [[a.text() for a in button.menu().actions()] for button in buttons] == [entries], buttons
+    for action in submenus[0].actions()[:3]:
+        action.trigger()
+        wait_for(open_dialog, action.text())
+        dialog = open_dialog()[0]
+        assert dialog.algorithm().displayName() == action.text().rstrip("…"), action.text()
+        dialog.close()
 
 
 def open_dialog():
@@ -135,6 +151,7 @@ def main():
     try:
         QgsSettings().setValue("meshmark/key_file", f"{WORK}/key.json")
         QgsSettings().setValue("meshmark/record_folder", f"{WORK}/records")
+        is_in_menu_and_toolbar()
         tidy_window()
         export_by_context_menu()
         verify()

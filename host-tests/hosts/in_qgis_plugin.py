@@ -1,12 +1,16 @@
 """Runs the plugin's algorithms on layers that are no plain files, and cancels: qgis_plugin.sh verifies the copies."""
 
+import json
 import os
+import subprocess
 import sys
 import threading
+from unittest import mock
 
 sys.path[:0] = ["/usr/share/qgis/python/plugins", sys.argv[1]]
 
 import folder
+from meshmark import commands
 from meshmark.provider import MeshmarkProvider
 from osgeo import gdal
 from processing.core.Processing import Processing
@@ -19,6 +23,7 @@ from qgis.core import (
     QgsProcessingModelAlgorithm,
     QgsProcessingModelChildAlgorithm,
     QgsProcessingModelChildParameterSource,
+    QgsProcessingModelOutput,
     QgsProject,
     QgsRasterLayer,
     QgsSettings,
@@ -221,7 +226,60 @@ def no_command(name, content):
         QgsSettings().remove("meshmark/command")
 
 
-def model():
+def impostor(name, *lines):
+    """A program in the place of ogr2ogr that ends with exit code 0."""
+    path = f"{HERE}/{name}.sh"
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("\n".join(["#!/bin/sh", *lines, "exit 0", ""]))
+    os.chmod(path, 0o755)
+    return mock.patch.object(commands, "ogr2ogr", lambda: path)
+
+
+def older_file_is_no_copy():
+    """Exit code 0, and a copy for somebody else in the place: the run fails, and says whose file that is not."""
+    buildings = of_map("buildings")
+    export("older", [buildings])
+    for_b = {"RECIPIENT": "B", "OUTPUT": f"{HERE}/older.gpkg"}
+    fails("exists: choose another file", "older", [buildings], **for_b)
+    fails("older.gpkg is the older file", "older", [buildings], **for_b, OVERWRITE=True, PATCH_SIZE=4096)
+    no_copy = "No copy for B was made"
+    record_of_a = f"cp '{HERE}/records/older.json' '{HERE}/records/other.json'"
+    with impostor("idle"):
+        fails(no_copy, "older", [buildings], **for_b, OVERWRITE=True)
+        fails(no_copy, "other", [buildings], RECIPIENT="B")
+    others = f"cp '{HERE}/older.gpkg' '{HERE}/other.gpkg'; touch '{HERE}/records/other.reference.gpkg'"
+    for name, lines in [("unrecorded", [others]), ("of_another", [others, record_of_a])]:
+        with impostor(name, *lines):
+            try:
+                export("other", [buildings], RECIPIENT="B")
+            except QgsProcessingException as error:
+                assert no_copy in str(error), error
+            else:
+                raise AssertionError(f"{name}: what another run wrote is taken for the copy")
+        for left in ("other.gpkg", "records/other.json", "records/other.reference.gpkg"):
+            if os.path.exists(left):
+                os.remove(left)
+    by_message = export("by_message", [buildings], RECIPIENT=None, MESSAGE="00112233445566778899AABBCCDDEEFF")
+    assert os.path.exists(by_message["RECORD"])
+    print("passed: qgis_plugin: what this run did not make is no copy", flush=True)
+
+
+def figures_are_per_cent():
+    import processing
+
+    maps = {"ORIGINAL": f"{HERE}/records/older.reference.gpkg", "MARKED": f"{HERE}/older.gpkg"}
+    feedback = QgsProcessingFeedback(False)
+    found = processing.run("meshmark:compare", {**maps, "REPORT": None}, feedback=feedback)
+    command = [commands.meshmark(), "compare", "--json", *maps.values()]
+    shares = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    kept = found["RIGHT_ANGLES_KEPT_PERCENT"]
+    assert abs(kept - 100 * shares["angles"]["right_angles_kept"]) < 1e-9 and kept > 1, kept
+    assert abs(found["AREA_MAX_CHANGE_PERCENT"] - 100 * shares["areas"]["max_change"]) < 1e-9, found
+    assert f"Right angles kept within 1 degree: {kept:.3g} %" in feedback.textLog(), feedback.textLog()
+    print("passed: qgis_plugin: shares are given as per cent", flush=True)
+
+
+def model(has_output, recipient="ACME GmbH"):
     """Export, then verify what was exported."""
 
     def child(name, values):
@@ -234,22 +292,40 @@ def model():
     value = QgsProcessingModelChildParameterSource.fromStaticValue
     output = QgsProcessingModelChildParameterSource.fromChildOutput
     places = {"KEY": value(f"{HERE}/key.json"), "RECORDS": value(f"{HERE}/records")}
-    subject = {"RECIPIENT": value("ACME GmbH"), "OUTPUT": value(f"{HERE}/model.gpkg")}
+    subject = {"RECIPIENT": value(recipient)}
     maps = {"REFERENCE": output("export", "REFERENCE"), "SUSPECT": output("export", "OUTPUT")}
     made = QgsProcessingModelAlgorithm("mark and verify")
     layers = value([f"{HERE}/map.gpkg|layername=buildings"])
-    made.addChildAlgorithm(child("export", {"LAYERS": layers, **subject, **places}))
+    exporting = child("export", {"LAYERS": layers, **subject, **places})
+    if has_output:
+        marked = QgsProcessingModelOutput("marked")
+        marked.setChildId("export")
+        marked.setChildOutputName("OUTPUT")
+        exporting.setModelOutputs({"marked": marked})
+    made.addChildAlgorithm(exporting)
     made.addChildAlgorithm(child("verify", {**maps, "RECORD": output("export", "RECORD"), **places}))
     return made
 
 
 def run_in_a_model():
-    context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
-    made = model()
-    made.initAlgorithm()
-    _, ok = made.run({}, context, feedback)
-    assert ok and "MATCH: " in feedback.textLog(), feedback.textLog()
+    ok, log = run_model(f"{HERE}/model.gpkg")
+    assert ok and "MATCH: " in log, log
     print("passed: qgis_plugin: a model marks and verifies", flush=True)
+    for output, why in [(f"{HERE}/model.gpkg", "exists: choose another file"), (None, "No file to hand out is named")]:
+        with folder.unchanged(f"qgis_plugin: a model stops: {why}"):
+            ok, log = run_model(output)
+            assert not ok and why in log and "Verifying" not in log, log
+    ok, log = run_model(f"{HERE}/new.gpkg", recipient="")
+    assert not ok and "No recipient is given" in log and "Verifying" not in log, log
+
+
+def run_model(output, **subject):
+    """Whether it succeeds, and what it says. QGIS makes a temporary file of an output that is none of the model's."""
+    context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
+    made = model(output is not None, **subject)
+    made.initAlgorithm()
+    _, ok = made.run({"export:marked": output} if output else {}, context, feedback)
+    return ok, feedback.textLog()
 
 
 def fail_without_a_trace():
@@ -263,6 +339,8 @@ def fail_without_a_trace():
     fails("exists: choose another file", "memory", [buildings])
     fails("does not exist: make it", "none/other", [buildings])
     fails("is the file of the layer buildings itself", "map", [buildings], OVERWRITE=True)
+    fails("No file to hand out is named", "other", [buildings], OUTPUT="TEMPORARY_OUTPUT")
+    fails("No recipient is given", "other", [buildings], RECIPIENT=" ")
     both_files_or_none()
     no_layers()
     no_command("of_another_machine", b"\x7fELF of another machine")
@@ -280,4 +358,6 @@ export_layers()
 verify_what_a_layer_shows()
 verify_again()
 run_in_a_model()
+older_file_is_no_copy()
+figures_are_per_cent()
 fail_without_a_trace()

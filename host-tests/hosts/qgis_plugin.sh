@@ -28,9 +28,10 @@ passed "qgis_process lists the three algorithms"
 "$qgis_process" help meshmark:export >"$work/log" 2>&1
 grep -q 'Amplitude of every coefficient' "$work/log" || fail "the help of AMPLITUDE is not that of the driver"
 
-# run ALGORITHM NAME=VALUE...: the exit code of qgis_process says nothing about algorithms that fail.
+# run ALGORITHM NAME=VALUE...: leaves the exit code in $code.
 run() {
-    "$qgis_process" run "meshmark:$1" -- "${@:2}" >"$work/log" 2>&1 || true
+    code=0
+    "$qgis_process" run "meshmark:$1" -- "${@:2}" >"$work/log" 2>&1 || code=$?
 }
 
 says() {
@@ -82,6 +83,8 @@ verify "the commands of docs/qgis.md" example/records/acme.reference.gpkg exampl
 (cd "$maps" && find . -type f -exec sha256sum {} + | sort -k2) >"$work/before"
 refused() {
     says "$1" "$2"
+    [ "$code" -ne 0 ] || fail "$1: qgis_process ends with exit code 0"
+    ! grep -q '^RECORD:' <(sed -n '/^Results/,$p' "$work/log") || fail "$1: a record is named"
     (cd "$maps" && find . -type f -exec sha256sum {} + | sort -k2) >"$work/after"
     diff "$work/before" "$work/after" || fail "$1: files were changed or left"
     passed "$1: everything is as it was"
@@ -96,6 +99,12 @@ run export "${two_layers[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" KEY="$PWD/key
 refused "export, no record folder" "none does not exist: make it, or choose another"
 run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" MESSAGE=0011
 refused "export, recipient and message" "but not both"
+run export "${export_two[@]}" OUTPUT="$maps/new.gpkg"
+refused "export, no recipient" "No recipient is given"
+run export "${export_two[@]}" "${acme[@]}" OUTPUT=TEMPORARY_OUTPUT
+refused "export, a temporary file" "No file to hand out is named"
+run export "${export_two[@]}" RECIPIENT=B OUTPUT="$marked" OVERWRITE=1 PATCH_SIZE=4096
+refused "export, a failure with an older file in the place" "is the older file, not a copy of this run"
 run export "${export_two[@]}" "${acme[@]}" OUTPUT="$maps/new.gpkg" PATCH_SIZE=4096
 refused "export, a map that is too small" "vertices"
 run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/wrong.json" RECORD="$base.json" \
@@ -133,6 +142,8 @@ cp "$fixture" map.gpkg
 for copy in memory filtered degrees joined; do
     verify "a copy of layers, $copy" "records/$copy.reference.gpkg" "$copy.gpkg" --record "records/$copy.json"
 done
+
+timeout 300 "${python[@]}" "$hosts/in_qgis_dialogs.py" "$profile/python/plugins" 2>"$work/log" || fail "$(cat "$work/log")"
 
 # In QGIS itself.
 mkdir "$work/desktop" "$work/desktop/records" "$work/pictures"

@@ -60,6 +60,11 @@ class Algorithm(QgsProcessingAlgorithm):
         # The framework owns it from here on.
         self.addParameter(parameter)
 
+    def createCustomParametersWidget(self, parent=None):
+        from .dialog import Dialog
+
+        return Dialog(self, parent=parent)
+
     def canExecute(self):
         try:
             self.needs()
@@ -67,11 +72,23 @@ class Algorithm(QgsProcessingAlgorithm):
             return False, str(missing)
         return True, ""
 
+    def objection(self, parameters, context):
+        """What no value by itself shows: why the run cannot begin, None when it can."""
+        return None
+
+    def checkParameterValues(self, parameters, context):
+        objection = self.objection(parameters, context)
+        return (False, objection) if objection else super().checkParameterValues(parameters, context)
+
     def prepareAlgorithm(self, parameters, context, feedback):
         try:
             self.needs()
         except Missing as missing:
             raise QgsProcessingException(str(missing)) from missing
+        # A model asks nobody else.
+        objection = self.objection(parameters, context)
+        if objection:
+            raise QgsProcessingException(objection)
         return self.prepare(parameters, context, feedback)
 
     def processAlgorithm(self, parameters, context, feedback):

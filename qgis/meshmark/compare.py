@@ -16,6 +16,10 @@ from .text import tr
 from .verify import answer
 
 
+# Ends the names of figures that the command gives as shares of one.
+PERCENT = "_PERCENT"
+
+
 class Compare(Algorithm):
     NAME = "compare"
 
@@ -78,9 +82,11 @@ class Compare(Algorithm):
                 arguments += [inputs.path(self._marked, "marked", context, feedback)]
                 feedback.setProgressText(tr("Comparing"))
                 found = answer(commands.run(arguments, feedback), (0,), feedback)
-        results = {name: found[section][figure] for name, _, (section, figure) in figures()}
-        for name, label, _ in figures():
-            feedback.pushInfo(f"{label}: {results[name]:.6g}")
+        results = {}
+        for name, label, (section, figure) in figures():
+            share = name.endswith(PERCENT)
+            results[name] = found[section][figure] * (100 if share else 1)
+            feedback.pushInfo(f"{label}: {results[name]:.3g} %" if share else f"{label}: {results[name]:.6g}")
         return {**results, "REPORT": self._report.path} if self._report.path else results
 
     def postProcessAlgorithm(self, context, feedback):
@@ -97,9 +103,9 @@ def figures():
         ("DISPLACEMENT_P99_M", tr("Displacement, 99th percentile, metres"), ("displacement", "p99_m")),
         ("DISPLACEMENT_MAX_M", tr("Displacement, largest, metres"), ("displacement", "max_m")),
         ("ANGLE_MEAN_CHANGE_DEG", tr("Change of angles, mean, degrees"), ("angles", "mean_change_deg")),
-        ("RIGHT_ANGLES_KEPT", tr("Share of right angles kept within 1 degree"), ("angles", "right_angles_kept")),
-        ("AREA_MEAN_CHANGE", tr("Change of areas, mean share"), ("areas", "mean_change")),
-        ("AREA_MAX_CHANGE", tr("Change of areas, largest share"), ("areas", "max_change")),
+        ("RIGHT_ANGLES_KEPT_PERCENT", tr("Right angles kept within 1 degree"), ("angles", "right_angles_kept")),
+        ("AREA_MEAN_CHANGE_PERCENT", tr("Change of areas, mean"), ("areas", "mean_change")),
+        ("AREA_MAX_CHANGE_PERCENT", tr("Change of areas, largest"), ("areas", "max_change")),
         ("NEWLY_INVALID", tr("Geometries that became invalid"), ("validity", "newly_invalid")),
         ("NEW_OVERLAPS", tr("New overlaps of polygons"), ("overlaps", "new")),
         ("NEW_CROSSINGS", tr("New crossings of lines"), ("crossings", "new")),

@@ -15,17 +15,17 @@ from qgis.core import (
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterMultipleLayers,
+    QgsProcessingUtils,
 )
 
 from . import commands, driver, layers, parameters, settings
 from .algorithm import Algorithm, sentences
 from .driver import Missing
+from .proof import Proof
 from .text import tr
 
 # Options of the driver that the algorithm sets itself: paths, and what follows from the layers and the file name.
 OWN = {"KEY", "RECORD", "REFERENCE", "LAYERS", "FORMAT"}
-# What most exports need; all others are advanced.
-COMMON = {"RECIPIENT", "MESSAGE", "AMPLITUDE", "TOLERANCE", "SHAPE"}
 
 
 class Export(Algorithm):
@@ -54,9 +54,22 @@ class Export(Algorithm):
             tr("What they show is exported, with their filters and unsaved edits. Several layers need a GeoPackage."),
         )
         self._options = self._driver_options()
-        for option in self._options:
-            if option.name in COMMON:
-                self.addParameter(parameters.parameter(option))
+        options = {option.name: parameters.parameter(option) for option in self._options}
+        if "RECIPIENT" in options:
+            self.add(
+                options.pop("RECIPIENT"),
+                tr("Who receives this copy; required, unless a message is given (advanced parameters)."),
+            )
+        output = QgsProcessingParameterFileDestination("OUTPUT", tr("Marked map"), file_filter())
+        # A file that exists is refused, whatever the answer.
+        output.setMetadata({"widget_wrapper": {"dontconfirmoverwrite": True}})
+        self.add(
+            output,
+            tr(
+                "The file to hand out; required. Its extension chooses the format; only GeoPackage holds several"
+                " layers."
+            ),
+        )
         self.add(
             QgsProcessingParameterFile("KEY", tr("Key file"), defaultValue=settings.get(settings.KEY_FILE) or None),
             tr("The secret key, made once by `meshmark keygen key.json`. Only its path is handed on."),
@@ -68,17 +81,12 @@ class Export(Algorithm):
             ),
             tr("Where the record (.json) and the reference (.reference.gpkg) of this copy are kept for an auditor."),
         )
+        for made in options.values():
+            self.addParameter(parameters.advanced(made))
         self.add(
-            QgsProcessingParameterFileDestination("OUTPUT", tr("Marked map"), file_filter()),
-            tr("The file to hand out. Its extension chooses the format; only GeoPackage holds several layers."),
+            parameters.advanced(QgsProcessingParameterBoolean("ADD_TO_PROJECT", tr("Add to the project"), True)),
+            tr("Shows the marked map when it is written."),
         )
-        self.add(
-            QgsProcessingParameterBoolean("ADD_TO_PROJECT", tr("Add the marked map to the project"), True),
-            tr("Shows the result when it is written."),
-        )
-        for option in self._options:
-            if option.name not in COMMON:
-                self.addParameter(parameters.advanced(parameters.parameter(option)))
         self.addOutput(QgsProcessingOutputMultipleLayers("MARKED_LAYERS", tr("Marked layers")))
         self.addOutput(QgsProcessingOutputFile("RECORD", tr("Record")))
         self.addOutput(QgsProcessingOutputFile("REFERENCE", tr("Reference")))
@@ -91,12 +99,18 @@ class Export(Algorithm):
         except Missing:
             return []
 
-    def checkParameterValues(self, given, context):
-        ok, message = super().checkParameterValues(given, context)
-        subjects = [self.parameterAsString(given, name, context) for name in ("RECIPIENT", "MESSAGE")]
-        if ok and self._options and subjects.count("") != 1:
-            return False, tr("Give a recipient, or a message instead of it, but not both.")
-        return ok, message
+    def objection(self, given, context):
+        subjects = [self.parameterAsString(given, name, context).strip() for name in ("RECIPIENT", "MESSAGE")]
+        if self._options and not any(subjects):
+            return tr("No recipient is given: name who receives this copy, or give a message (advanced parameters).")
+        if all(subjects):
+            return tr("A recipient and a message are given: give one of them, but not both.")
+        if not is_kept(self.parameterAsFileOutput(given, "OUTPUT", context), context):
+            return tr(
+                "No file to hand out is named (Marked map): a temporary file would be lost while its record and"
+                " reference stay."
+            )
+        return None
 
     def prepare(self, given, context, feedback):
         chosen = self.parameterAsLayerList(given, "LAYERS", context)
@@ -120,7 +134,9 @@ class Export(Algorithm):
             source = os.path.join(staging, "source.gpkg")
             feedback.setProgressText(tr("Copying the layers"))
             names = layers.copy(self._snapshots, source, context, feedback)
+            proof = Proof(output, record, reference)
             export(source, output, options, feedback)
+            proof.check(values["RECIPIENT"], values["MESSAGE"])
         feedback.pushInfo(tr("Record: {}").format(record))
         feedback.pushInfo(tr("Reference: {}").format(reference))
         marked = layers_of(output)
@@ -133,8 +149,18 @@ class Export(Algorithm):
         return {"OUTPUT": output, "MARKED_LAYERS": marked, "RECORD": record, "REFERENCE": reference}
 
 
+def is_kept(path, context):
+    """Whether a path is given that QGIS does not clear away when it ends, as it does those of its temporary folder."""
+    folders = [QgsProcessingUtils.tempFolder()]
+    # Later versions of QGIS have one for each context, too.
+    if hasattr(context, "temporaryFolder") and context.temporaryFolder():
+        folders.append(context.temporaryFolder())
+    place = os.path.abspath(path)
+    return bool(path) and not any(place.startswith(os.path.join(os.path.abspath(folder), "")) for folder in folders)
+
+
 def export(source, output, options, feedback):
-    """Marks a file by a child process, which can be stopped, and makes sure that the marked file is there."""
+    """Marks a file by a child process, which can be stopped."""
     feedback.setProgressText(tr("Marking"))
     arguments = [commands.ogr2ogr(), "-progress", "-f", "MESHMARK", f"MESHMARK:{output}", source]
     for option in options:
@@ -147,11 +173,14 @@ def export(source, output, options, feedback):
     errors, warnings = sentences(finished.errors)
     for warning in warnings:
         feedback.pushWarning(warning)
-    if finished.code != 0 or not os.path.exists(output):
+    if finished.code != 0:
         ended = tr("ogr2ogr ended with exit code {}.").format(finished.code)
         if "Unable to find driver" in finished.errors:
             errors.append(tr("Is the folder in Settings > Options > meshmark that of a driver for this GDAL?"))
-        raise QgsProcessingException("\n".join(errors or [ended]))
+        errors = errors or [ended]
+        if os.path.lexists(output):
+            errors.append(tr("{} is the older file, not a copy of this run.").format(output))
+        raise QgsProcessingException("\n".join(errors))
 
 
 def percent(text):

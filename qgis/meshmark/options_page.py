@@ -10,18 +10,20 @@ from .text import tr
 
 
 def rows():
-    """Setting, label, what is chosen, and what holds while it is empty."""
+    """Setting, label, what is chosen, what holds while it is empty, and what it is for."""
     file, folder = QgsFileWidget.StorageMode.GetFile, QgsFileWidget.StorageMode.GetDirectory
+    default = tr("The default of the dialogs.")
     return [
-        (settings.COMMAND, tr("Command meshmark"), file, tr("the one on the path")),
+        (settings.COMMAND, tr("Command"), file, tr("the one on the path"), tr("The program meshmark.")),
         (
             settings.DRIVER_FOLDER,
-            tr("Folder of the GDAL driver (ogr_MESHMARK.so)"),
+            tr("Driver folder"),
             folder,
             tr("GDAL's plugin folder"),
+            tr("The folder of the GDAL driver (ogr_MESHMARK.so)."),
         ),
-        (settings.KEY_FILE, tr("Key file, as the default of the dialogs"), file, tr("none")),
-        (settings.RECORD_FOLDER, tr("Record folder, as the default of the dialogs"), folder, tr("none")),
+        (settings.KEY_FILE, tr("Key file"), file, tr("none"), default),
+        (settings.RECORD_FOLDER, tr("Record folder"), folder, tr("none"), default),
     ]
 
 
@@ -31,15 +33,19 @@ class OptionsPage(QgsOptionsPageWidget):
         self._changed = changed
         self._widgets = {}
         layout = QFormLayout(self)
-        for name, label, mode, otherwise in rows():
+        for name, label, mode, otherwise, purpose in rows():
             widget = QgsFileWidget(self)
             widget.setStorageMode(mode)
             widget.setFilePath(settings.get(name))
             widget.lineEdit().setPlaceholderText(otherwise)
+            widget.setToolTip(purpose)
             layout.addRow(label, widget)
             self._widgets[name] = widget
         note = QLabel(
-            tr("The paths of the command and of the driver are only needed where they are not found by themselves.")
+            tr(
+                "The paths of the command and of the driver are only needed where they are not found by themselves."
+                " Key file and record folder are the defaults of the dialogs."
+            )
         )
         note.setWordWrap(True)
         layout.addRow(note)

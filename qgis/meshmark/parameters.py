@@ -20,7 +20,7 @@ def labels():
     """What options are called in the dialog; one that a later driver has is called as the driver calls it."""
     return {
         "RECIPIENT": tr("Recipient"),
-        "MESSAGE": tr("Message in hexadecimal digits, instead of a recipient"),
+        "MESSAGE": tr("Message, hexadecimal"),
         "AMPLITUDE": tr("Amplitude, metres"),
         "TOLERANCE": tr("Tolerance, metres"),
         "PRECISION": tr("Precision, CRS units"),
@@ -29,8 +29,8 @@ def labels():
         "CODE": tr("Code"),
         "CHIP_RATE": tr("Chip rate"),
         "PATCH_SIZE": tr("Patch size, vertices"),
-        "SRS": tr("CRS of layers that have none"),
-        "OVERWRITE": tr("Replace the file when it exists"),
+        "SRS": tr("CRS where none is set"),
+        "OVERWRITE": tr("Replace the file"),
     }
 
 

@@ -32,8 +32,8 @@ class Verify(Algorithm):
     def about(self):
         return tr(
             "Says whether a suspect map is a copy that was marked with your key, and whose. Given one record it"
-            " tests that copy, given a folder of records it finds the recipient. The result is a verdict with the"
-            " probability that it is wrong, a report, and two layers: an arrow for the displacement of every"
+            " tests that copy, given a folder of records it finds the recipient. The result is a verdict, with the"
+            " probability that a map fits so well by chance, a report, and two layers: an arrow for the displacement of every"
             " matched vertex, coloured by how well it fits in with its neighbours, and the patches of the mesh with"
             " the evidence of each."
         )
@@ -89,14 +89,11 @@ class Verify(Algorithm):
         self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
         self.addOutput(QgsProcessingOutputString("REASON", tr("Why")))
         self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Whose copy it is; empty without a match")))
-        self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of error, its decimal logarithm")))
+        self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of such a fit by chance, decimal logarithm")))
         self.addOutput(QgsProcessingOutputNumber("MATCHED_VERTICES", tr("Matched vertices")))
 
-    def checkParameterValues(self, given, context):
-        ok, message = super().checkParameterValues(given, context)
-        if ok and not self._marks(given, context):
-            return False, tr("Give a record, or a folder of records.")
-        return ok, message
+    def objection(self, given, context):
+        return None if self._marks(given, context) else tr("Give a record, or a folder of records.")
 
     def _marks(self, given, context):
         """The option that names the record, or the folder of records."""

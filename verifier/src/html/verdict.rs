@@ -59,7 +59,7 @@ fn sentence(report: &Report) -> Markup {
                 " cannot tell whether it carries the mark of " (mark(report)) ": " (printable(&report.reason))
                 @match odds {
                     Some(odds) => { "; by chance, " (chance) " " (odds) "." }
-                    None => { "; so there are no odds to give." }
+                    None => { "; so how often chance fits as well cannot be said." }
                 }
             }
         }

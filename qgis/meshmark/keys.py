@@ -1,0 +1,56 @@
+"""New keys, which the command `meshmark keygen` makes."""
+
+import os
+
+from qgis.core import QgsFeedback
+from qgis.PyQt.QtWidgets import QFileDialog, QMessageBox
+
+from . import commands, settings
+from .algorithm import sentences
+from .driver import Missing
+from .text import tr
+
+
+class Refused(Exception):
+    """The command made no key; the message is its own."""
+
+
+def make(path):
+    """Makes a key in a new file that only its owner can read; raises Refused when the file exists."""
+    finished = commands.run([commands.meshmark(), "keygen", "--", path], QgsFeedback())
+    if finished.code != 0:
+        errors, _ = sentences(finished.errors)
+        ended = tr("meshmark ended with exit code {}.").format(finished.code)
+        raise Refused("\n".join(errors or [ended]))
+
+
+def ask_and_make(parent):
+    """Asks for a file and makes a key there; gives its path, None when none was made."""
+    folder = os.path.dirname(settings.get(settings.KEY_FILE)) or os.path.expanduser("~")
+    path, _ = QFileDialog.getSaveFileName(
+        parent,
+        tr("New key"),
+        os.path.join(folder, "key.json"),
+        tr("Key files (*.json)"),
+        # A key that exists is refused below, whatever the answer.
+        options=QFileDialog.Option.DontConfirmOverwrite,
+    )
+    if not path:
+        return None
+    path = path if os.path.splitext(path)[1] else f"{path}.json"
+    try:
+        make(path)
+    except (Missing, Refused) as reason:
+        QMessageBox.warning(parent, tr("New key"), str(reason))
+        return None
+    if not settings.get(settings.KEY_FILE):
+        settings.put(settings.KEY_FILE, path)
+    QMessageBox.information(
+        parent,
+        tr("New key"),
+        tr(
+            "The key is in {}. Keep it secret: whoever has it can read and forge marks. Keep a copy of it safe: without"
+            " it no mark can be verified."
+        ).format(path),
+    )
+    return path
