@@ -65,5 +65,7 @@ pub mod spectrum;
 mod topology;
 mod tridiagonal;
 pub mod vertices;
+mod words;
 
 pub use error::{Error, Result};
+pub use words::counted;
