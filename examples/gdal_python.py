@@ -17,6 +17,8 @@ options = [f"KEY={key}", f"RECIPIENT={recipient}", "RECORD=written.json", "REFER
 dataset = gdal.VectorTranslate(
     "MESHMARK:written.gpkg", source, format="MESHMARK", dstSRS="EPSG:3857", datasetCreationOptions=options
 )
+gdal.ErrorReset()
 del dataset  # closing it marks, reads back and publishes
-if not os.path.exists("written.gpkg"):  # Python hears of no failure while closing
-    sys.exit("written.gpkg was not written")
+# Closing raises nothing: the last error says how it went. An older file would have been refused above.
+if gdal.GetLastErrorType() == gdal.CE_Failure or not os.path.exists("written.gpkg"):
+    sys.exit(gdal.GetLastErrorMsg() or "written.gpkg is not closed")

@@ -67,5 +67,7 @@ mod topology;
 mod tridiagonal;
 pub mod vertices;
 mod whitening;
+mod words;
 
 pub use error::{Error, Result};
+pub use words::counted;

@@ -1,3 +1,4 @@
+use crate::read_back::Difference;
 use meshmark_core::options::Spelling;
 use std::fmt;
 
@@ -23,7 +24,7 @@ pub enum Error {
     OneLayer { driver: &'static str },
     NotWgs84 { driver: &'static str, layer: String },
     Folder { driver: &'static str },
-    NotKept { driver: &'static str, layer: String, difference: String },
+    NotKept { driver: &'static str, layer: String, difference: Difference },
     File { action: &'static str, path: String, reason: String },
     Exists { path: String, remedy: &'static str },
     Gdal(gdal::errors::GdalError),
@@ -132,8 +133,8 @@ impl Error {
                 format!("{driver} would make a folder of it: write one layer, or a GeoPackage")
             }
             Error::NotKept { driver, layer, difference } => format!(
-                "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; choose \
-                 another format or its options"
+                "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; {}",
+                difference.remedy()
             ),
             Error::File { action, path, reason } => format!("{action} {path} failed: {reason}"),
             Error::Exists { path, remedy } => format!("{path} exists: {remedy}"),

@@ -1,6 +1,6 @@
 //! The formats a marked map is written to: those whose drivers were seen to keep what they were given.
 
-use crate::{Error, Result};
+use crate::{Error, Result, decimals::Digits};
 use std::path::Path;
 
 /// A format, by GDAL's driver for it.
@@ -82,16 +82,36 @@ impl Format {
         }
     }
 
-    /// How far a coordinate of this size may be from what was written, CRS units; zero where every bit is kept.
-    pub fn tolerance(&self, layer_options: Options, magnitude: f64) -> f64 {
-        if let Coordinates::Binary = self.coordinates {
-            return 0.0;
+    /// The digits with which a layer with these options is written.
+    pub fn digits(&self, layer_options: Options) -> Digits {
+        let Coordinates::Json { always_rfc7946 } = self.coordinates else { return Digits::Every };
+        let number = |name| value(layer_options, name).map(leading_number);
+        let is_rfc7946 = self.is_wgs84_only(layer_options);
+        let rfc7946 = || is_rfc7946.then_some(RFC7946_DECIMALS);
+        let count = |number: i64| usize::try_from(number).ok();
+        let decimals = match number("COORDINATE_PRECISION") {
+            // GeoJSONSeq takes what is given as it is, GeoJSON a negative number for none.
+            Some(given) => count(given).or_else(|| if always_rfc7946 { None } else { rfc7946() }),
+            None => rfc7946(),
+        };
+        match (decimals, number("SIGNIFICANT_FIGURES").and_then(count)) {
+            (Some(decimals), _) => Digits::Decimals(decimals),
+            (None, Some(figures)) => Digits::Figures(figures),
+            (None, None) => Digits::Decimals(DEFAULT_DECIMALS),
         }
-        let given = value(layer_options, "COORDINATE_PRECISION").and_then(|text| text.parse().ok());
-        let digits: i32 = given.unwrap_or(if self.is_wgs84_only(layer_options) { 7 } else { 15 });
-        // The last bits go in the conversion to decimal digits and back.
-        0.5 * 10f64.powi(-digits) * (1.0 + 1e-6) + 4.0 * f64::EPSILON * magnitude
     }
+}
+
+/// Decimals of RFC 7946, section 11.2, as GDAL writes them.
+const RFC7946_DECIMALS: usize = 7;
+/// GDAL's own choice.
+const DEFAULT_DECIMALS: usize = 15;
+
+/// The whole number that a text begins with, or 0: as GDAL reads it.
+fn leading_number(text: &str) -> i64 {
+    let digits = text.trim_start_matches(['+', '-']);
+    let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+    text[..text.len() - digits.len() + end].parse().unwrap_or(0)
 }
 
 fn value<'a>(options: Options<'a>, name: &str) -> Option<&'a str> {
@@ -122,13 +142,14 @@ mod tests {
     }
 
     #[test]
-    fn digits_after_the_point_are_those_of_the_layer_option() {
+    fn digits_are_those_of_the_layer_options() {
         let format = Format::find(Some("GeoJSON"), Path::new("")).unwrap();
-        let two = options("coordinate_precision", "2");
-        assert!((format.tolerance(&two, 0.0) - 0.005).abs() < 1e-6);
-        assert!(format.tolerance(&[], 1e6) < 1e-8);
-        assert!((format.tolerance(&options("RFC7946", "YES"), 0.0) - 5e-8).abs() < 1e-12);
-        assert_eq!(Format::find(Some("GPKG"), Path::new("")).unwrap().tolerance(&two, 1e6), 0.0);
+        let two = options("coordinate_precision", " 2 ");
+        assert_eq!(format.digits(&two), Digits::Decimals(2));
+        assert_eq!(format.digits(&options("RFC7946", "YES")), Digits::Decimals(7));
+        assert_eq!(format.digits(&options("SIGNIFICANT_FIGURES", "10")), Digits::Figures(10));
+        assert_eq!(format.digits(&options("SIGNIFICANT_FIGURES", "-1")), format.digits(&[]));
+        assert_eq!(Format::find(Some("GPKG"), Path::new("")).unwrap().digits(&two), Digits::Every);
     }
 
     #[test]

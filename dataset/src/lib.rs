@@ -5,6 +5,7 @@
 
 mod assumption;
 mod crs;
+pub mod decimals;
 mod error;
 mod features;
 mod file_id;

@@ -3,15 +3,95 @@
 //! Drivers of GDAL may fail without a word, and formats round, turn rings around and change the order of
 //! features; so the features of the file that was written are compared with those that were meant.
 
-use crate::wkb::{self, WkbError};
+use crate::{
+    decimals::Digits,
+    wkb::{self, WkbError},
+};
 use gdal::vector::{Feature, Layer, LayerAccess};
-use meshmark_core::vertices::VertexTable;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use meshmark_core::counted;
+use std::{
+    fmt,
+    hash::{DefaultHasher, Hash, Hasher},
+};
+
+/// How a layer of a file differs from what was meant.
+#[derive(Debug)]
+pub enum Difference {
+    /// It has another number of features; so many of those that were meant have no coordinates.
+    Features {
+        /// How many features were meant.
+        meant: usize,
+        /// How many there are.
+        in_file: usize,
+        /// How many of those that were meant have a null or an empty geometry.
+        without_geometry: usize,
+    },
+    /// Anything else, in a few words.
+    Other(String),
+}
+
+impl From<String> for Difference {
+    fn from(words: String) -> Self {
+        Difference::Other(words)
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Difference::Features { meant, in_file, without_geometry: 0 } => {
+                write!(f, "{} were meant, {in_file} are there", counted(*meant, "feature"))
+            }
+            Difference::Features { meant, in_file, without_geometry } => write!(
+                f,
+                "{} were meant, {without_geometry} of them with a null or empty geometry, and {in_file} are there",
+                counted(*meant, "feature")
+            ),
+            Difference::Other(words) => f.write_str(words),
+        }
+    }
+}
+
+impl Difference {
+    /// What to do about it.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Difference::Features { without_geometry: 1.., .. } => {
+                "leave them out (of a GeoPackage with -where \"NOT ST_IsEmpty(geom)\"), or choose another format"
+            }
+            _ => "choose another format or its options",
+        }
+    }
+}
+
+/// How many features there are.
+#[derive(Default)]
+struct Counts {
+    meant: usize,
+    in_file: usize,
+    without_geometry: usize,
+}
+
+impl Counts {
+    fn add(&mut self, meant: Option<&[[f64; 2]]>, in_file: Option<&[[f64; 2]]>) {
+        self.meant += usize::from(meant.is_some());
+        self.in_file += usize::from(in_file.is_some());
+        self.without_geometry += usize::from(meant.is_some_and(<[_]>::is_empty));
+    }
+
+    fn check(self) -> Result<(), Difference> {
+        let Counts { meant, in_file, without_geometry } = self;
+        match meant == in_file {
+            true => Ok(()),
+            false => Err(Difference::Features { meant, in_file, without_geometry }),
+        }
+    }
+}
 
 /// How to compare a layer of a file with what was meant.
 pub struct Comparison<'a> {
-    /// How far a coordinate may be from what was meant, CRS units; 0: not one bit.
-    pub tolerance: f64,
+    /// The digits with which the layer is written.
+    pub digits: Digits,
     /// Where a coordinate of the first layer was meant to be; none when nobody knows.
     pub place: &'a dyn Fn([f64; 2]) -> Option<[f64; 2]>,
     /// What GDAL's last failure on this thread was, if there was one since the comparison began.
@@ -22,76 +102,75 @@ impl Comparison<'_> {
     /// Compares two layers; the coordinates of the second are added to `keep`.
     ///
     /// # Errors
-    /// The difference, in a few words.
+    /// The difference.
     pub fn layers(
         &self,
         meant: gdal::errors::Result<Layer>,
         in_file: gdal::errors::Result<Layer>,
         mut keep: Option<&mut Vec<[f64; 2]>>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Difference> {
         let (Ok(mut one), Ok(mut other)) = (meant, in_file) else {
-            return Err("the layer is missing".into());
+            return Err("the layer is missing".to_string().into());
         };
         one.reset_feature_reading(); // it was read to its end when it was written
         let (mut one, mut other) = (one.features(), other.features());
-        let mut sums = [0u64; 2];
+        let (mut counts, mut sums, mut kept) = (Counts::default(), [0u64; 2], Ok(()));
         loop {
-            match (one.next(), other.next()) {
-                (None, None) => break,
-                (Some(a), Some(b)) => {
-                    let (a, b) = (self.meant(&a)?, coords(&b)?);
-                    if let Some(keep) = &mut keep {
-                        keep.extend_from_slice(&b);
-                    }
-                    if self.tolerance > 0.0 {
-                        self.features(a, b)?;
-                    } else {
-                        // The order of features may be another one: what is in all of them counts.
-                        sums[0] = sums[0].wrapping_add(digest(a));
-                        sums[1] = sums[1].wrapping_add(digest(b));
-                    }
-                }
-                _ => {
-                    return Err((self.last_failure)().unwrap_or("another number of features".into()));
-                }
+            let (a, b) = (one.next(), other.next());
+            if a.is_none() && b.is_none() {
+                break;
+            }
+            let a = a.map(|feature| self.meant(&feature)).transpose()?;
+            let b = b.map(|feature| coords(&feature)).transpose()?;
+            counts.add(a.as_deref(), b.as_deref());
+            if let Some((keep, b)) = keep.as_mut().zip(b.as_ref()) {
+                keep.extend_from_slice(b);
+            }
+            let (Some(a), Some(b)) = (a, b) else { continue };
+            if self.digits == Digits::Every {
+                // The order of features may be another one: what is in all of them counts.
+                sums[0] = sums[0].wrapping_add(digest(a));
+                sums[1] = sums[1].wrapping_add(digest(b));
+            } else if kept.is_ok() {
+                kept = self.feature(a, b);
             }
         }
         if let Some(reason) = (self.last_failure)() {
-            return Err(reason);
+            return Err(reason.into());
         }
+        counts.check()?;
         match sums[0] == sums[1] {
-            true => Ok(()),
-            false => Err("other coordinates".into()),
+            true => Ok(kept?),
+            false => Err("other coordinates".to_string().into()),
         }
     }
 
     /// Compares a layer with coordinates in the order of its features, not one bit of which may differ.
     ///
     /// # Errors
-    /// The difference, in a few words.
+    /// The difference.
     pub fn in_order(
         &self,
         mut in_file: Layer,
         mut meant: impl Iterator<Item = [f64; 2]>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Difference> {
         for feature in in_file.features() {
             if coords(&feature)?.into_iter().any(|point| meant.next() != Some(point)) {
-                return Err("other coordinates".into());
+                return Err("other coordinates".to_string().into());
             }
         }
         match ((self.last_failure)(), meant.next()) {
-            (Some(reason), _) => Err(reason),
-            (None, Some(_)) => Err("another number of coordinates".into()),
+            (Some(reason), _) => Err(reason.into()),
+            (None, Some(_)) => Err("another number of coordinates".to_string().into()),
             (None, None) => Ok(()),
         }
     }
 
-    fn features(&self, a: Vec<[f64; 2]>, b: Vec<[f64; 2]>) -> Result<(), String> {
+    fn feature(&self, a: Vec<[f64; 2]>, b: Vec<[f64; 2]>) -> Result<(), String> {
         if a.len() != b.len() {
             return Err("another number of coordinates".into());
         }
-        let forth = find_all(&a, b.clone(), self.tolerance).is_some();
-        match forth && find_all(&b, a, self.tolerance).is_some() {
+        match self.digits.are_kept(&a, b) {
             true => Ok(()),
             false => Err("other coordinates".into()),
         }
@@ -127,20 +206,6 @@ fn digest(mut coords: Vec<[f64; 2]>) -> u64 {
     hasher.finish()
 }
 
-/// The nearest of `places` to every one of `wanted`, or none when one has none within `tolerance` along x and y.
-pub fn find_all(wanted: &[[f64; 2]], places: Vec<[f64; 2]>, tolerance: f64) -> Option<Vec<[f64; 2]>> {
-    let table = VertexTable::new(places).ok()?;
-    let places = table.coords();
-    let find = |&[x, y]: &[f64; 2]| {
-        let first = places.partition_point(|p| p[0] < x - tolerance);
-        let near = places[first..].iter().take_while(|p| p[0] <= x + tolerance);
-        let near = near.filter(|p| (p[1] - y).abs() <= tolerance);
-        let distance = |p: &[f64; 2]| (p[0] - x).hypot(p[1] - y);
-        near.min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
-    };
-    wanted.iter().map(find).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,16 +218,5 @@ mod tests {
         let mut other = ring.clone();
         other[1][0] = 2.0f64.next_up();
         assert_ne!(digest(ring), digest(other));
-    }
-
-    #[test]
-    fn the_nearest_place_within_the_tolerance_is_found_or_none() {
-        let places = vec![[0.0, 0.0], [0.04, 0.0], [0.0, 0.3], [5.0, 5.0]];
-        assert_eq!(
-            find_all(&[[0.03, 0.0], [5.0, 5.0]], places.clone(), 0.05),
-            Some(vec![[0.04, 0.0], [5.0, 5.0]])
-        );
-        assert_eq!(find_all(&[[0.0, 0.1]], places.clone(), 0.05), None);
-        assert_eq!(find_all(&[[0.0, 0.3]], places, 0.0), Some(vec![[0.0, 0.3]]));
     }
 }

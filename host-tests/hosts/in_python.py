@@ -75,7 +75,33 @@ def fail_between_two_features():
     assert "transaction" in gdal.GetLastErrorMsg(), gdal.GetLastErrorMsg()
 
 
+def copy_for(recipient, more=(), **selection):
+    """Writes copy.gpkg as docs/driver.md shows it; whether its check passes."""
+    options = ["KEY=key.json", f"RECIPIENT={recipient}", f"REFERENCE={recipient}.gpkg", f"RECORD={recipient}.json", *more]
+    try:
+        written = gdal.VectorTranslate(
+            "MESHMARK:copy.gpkg", "map.gpkg", format="MESHMARK", datasetCreationOptions=options, **selection
+        )
+    except RuntimeError:
+        return False
+    gdal.ErrorReset()
+    del written
+    return gdal.GetLastErrorType() != gdal.CE_Failure and os.path.exists("copy.gpkg")
+
+
+def an_older_copy_is_no_success():
+    too_small = {"layers": ["buildings"], "where": "fid < 3"}
+    replace = ["OVERWRITE=YES"]
+    with folder.unchanged("python: the older copy of A stays in the place of B's"):
+        assert not copy_for("B"), "an older file passes for the copy"
+        assert not copy_for("B", **too_small), "an older file passes for the copy"
+        assert not copy_for("B", replace, **too_small), "an older file passes for the copy that should replace it"
+    assert copy_for("B", replace), "a copy that replaces the older one fails the check"
+
+
 write_all_layers()
+assert copy_for("A"), "a copy in a free place fails the check"
+an_older_copy_is_no_success()
 with folder.unchanged("python: a wrong key file, reading"):
     read_with_wrong_key()
 with folder.unchanged("python: a wrong key file, writing"):

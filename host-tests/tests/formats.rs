@@ -198,3 +198,99 @@ fn a_marked_map_that_is_converted_carries_the_message() {
         host.matches("ref.gpkg", &["--record", "record.json", target]);
     }
 }
+
+/// A grid of houses, some of whose marked longitudes lie just beside a round number: there GDAL ends numbers early.
+fn houses_on_a_round_meridian() -> String {
+    let house = |number: u32| {
+        let jitter = |n: u32| f64::from(number * 7919 % 101 + n * 13) * 1e-7;
+        let (x, y) = (27.0 + (f64::from(number % 3) - 1.0) * 2e-4, 60.0 + f64::from(number / 3) * 2e-4);
+        let ring =
+            [(x, y + jitter(1)), (x + 1e-4, y + jitter(2)), (x + 1e-4, y + 8e-5), (x, y + 8e-5 + jitter(3))];
+        let ring: Vec<_> = ring.iter().chain(&ring[..1]).map(|(x, y)| format!("[{x}, {y}]")).collect();
+        let geometry = format!(r#"{{"type": "Polygon", "coordinates": [[{}]]}}"#, ring.join(", "));
+        format!(r#"{{"type": "Feature", "properties": {{"n": {number}}}, "geometry": {geometry}}}"#)
+    };
+    let houses: Vec<_> = (0..600).map(house).collect();
+    format!(r#"{{"type": "FeatureCollection", "features": [{}]}}"#, houses.join(",\n"))
+}
+
+#[test]
+fn any_number_of_digits_that_leaves_the_message_readable_is_written() {
+    let host = Host::new();
+    fs::write(host.path("map.geojson"), houses_on_a_round_meridian()).unwrap();
+    let digits =
+        |option: &str, counts: &[u32]| counts.iter().map(|n| format!("{option}={n}")).collect::<Vec<_>>();
+    let decimals = digits("COORDINATE_PRECISION", &[7, 8, 9, 10, 12, 15, 17]);
+    let figures = digits("SIGNIFICANT_FIGURES", &[10, 11, 13, 17]);
+    let in_metres = ["-t_srs", "EPSG:3067"].as_slice();
+    let cases = [
+        ("geojson", ["-lco", "RFC7946=YES"].as_slice(), decimals.clone()),
+        ("geojsonl", &[], decimals),
+        ("geojson", in_metres, digits("COORDINATE_PRECISION", &[2, 6, 8, 9, 12])),
+        ("geojson", in_metres, figures.clone()),
+        ("geojson", &[], figures),
+    ];
+    for (number, (ending, options, digits)) in cases.into_iter().enumerate() {
+        for digits in digits {
+            let target = format!("{number}-{digits}.{ending}");
+            let reference = format!("REFERENCE={target}.gpkg");
+            let record = format!("RECORD={target}.record.json");
+            let own = ["-lco", &digits, "-dsco", &reference, "-dsco", &record];
+            let options: Vec<_> = options.iter().chain(&own).copied().collect();
+            let run = host.create(&target, "map.geojson", &options);
+            assert_eq!(run.code, Some(0), "{target}: {}", run.stderr);
+        }
+    }
+}
+
+#[test]
+fn too_few_digits_for_the_message_are_refused_by_their_name() {
+    let cases = [
+        ("COORDINATE_PRECISION=4", "written with 4 decimals", "raise COORDINATE_PRECISION"),
+        ("COORDINATE_PRECISION=1", "written with 1 decimal:", "raise COORDINATE_PRECISION"),
+        ("SIGNIFICANT_FIGURES=5", "written with 5 significant figures", "raise SIGNIFICANT_FIGURES"),
+    ];
+    for (digits, said, remedy) in cases {
+        let host = Host::new();
+        fs::write(host.path("map.geojson"), houses_on_a_round_meridian()).unwrap();
+        let run = host.create("out.geojson", "map.geojson", &["-lco", digits]);
+        assert_eq!(run.code, Some(1), "{digits}: {}", run.stderr);
+        assert!(run.stderr.contains(said) && run.stderr.contains(remedy), "{digits}: {}", run.stderr);
+        assert_eq!(host.names(), ["key.json", "map.geojson"], "{digits}");
+    }
+}
+
+/// A copy of kotka's buildings in which so many features have a null geometry and one has an empty one.
+fn with_null_and_empty(host: &Host) {
+    host.run("ogr2ogr", &["map.gpkg", &kotka(), "buildings"]).succeeds();
+    let null = "INSERT INTO buildings (geom) VALUES (NULL), (NULL), (ST_GeomFromText('POLYGON EMPTY'))";
+    host.run("ogrinfo", &["-q", "-dialect", "SQLite", "-sql", null, "map.gpkg"]);
+}
+
+#[test]
+fn features_that_a_format_leaves_out_are_counted_and_the_remedy_helps() {
+    let host = Host::new();
+    with_null_and_empty(&host);
+    fs::write(host.path("list.csv"), "recipient\nACME GmbH\n").unwrap();
+    let list = [
+        "distribute",
+        "--key",
+        "key.json",
+        "--recipients",
+        "list.csv",
+        "--output-dir",
+        "out",
+        "-f",
+        "FlatGeobuf",
+    ];
+    let command = host.meshmark();
+    let distributed = host.run(command.to_str().unwrap(), &[&list[..], &["map.gpkg"]].concat());
+    for (way, run) in [("writing", host.create("out.fgb", "map.gpkg", &[])), ("distribute", distributed)] {
+        assert!(run.code != Some(0), "{way}: {}", run.stderr);
+        for word in ["\"buildings\"", "3 of them with a null or empty geometry", "NOT ST_IsEmpty(geom)"] {
+            assert!(run.stderr.contains(word), "{way}: {word:?} is not in: {}", run.stderr);
+        }
+    }
+    assert!(!host.names().iter().any(|name| name.ends_with(".fgb")), "{:?}", host.names());
+    host.create("out.fgb", "map.gpkg", &["-where", "NOT ST_IsEmpty(geom)"]).succeeds();
+}

@@ -1,3 +1,5 @@
+use meshmark_dataset::decimals::Digits;
+
 /// Why a map cannot be marked. Every message says what to do about it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -86,10 +88,11 @@ pub enum Error {
     #[error("{0}: nothing is written, what was there stays as it was")]
     Unfinished(String),
     #[error(
-        "only all but {errors} of {bits} bits of the message can be read from what was written: raise AMPLITUDE, or \
-         choose a format that keeps more digits"
+        "only all but {errors} of {bits} bits of the message can be read from what was written with {digits}: raise \
+         AMPLITUDE{}",
+        digits.more().map(|more| format!(", or keep more digits: {more}")).unwrap_or_default()
     )]
-    MessageUnreadable { errors: usize, bits: usize },
+    MessageUnreadable { errors: usize, bits: usize, digits: Digits },
     #[error(transparent)]
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]

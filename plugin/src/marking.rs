@@ -15,6 +15,7 @@ use meshmark_core::{
 };
 use meshmark_dataset::{
     LabelFields, MOST_VERTICES, Selection, Survey, Target, ThreadPool,
+    decimals::Digits,
     marking::{self, Moves, Unmarked},
     same_file, survey,
 };
@@ -162,7 +163,13 @@ impl Marking {
 
     /// Fails unless the message can be demodulated from where the vertices were found: their new places as
     /// somebody read them, in canonical order.
-    pub fn check_message(&self, request: &Request, found: &[[f64; 2]], threads: usize) -> Result<()> {
+    pub fn check_message(
+        &self,
+        request: &Request,
+        found: &[[f64; 2]],
+        digits: Digits,
+        threads: usize,
+    ) -> Result<()> {
         let parameters = &request.options.parameters;
         let message = request.subject.carried(&request.key);
         let map = self.map.map()?;
@@ -175,7 +182,7 @@ impl Marking {
         })?;
         match demodulated.message().errors(&message) {
             0 => Ok(()),
-            errors => Err(Error::MessageUnreadable { errors, bits: message.len() }),
+            errors => Err(Error::MessageUnreadable { errors, bits: message.len(), digits }),
         }
     }
 

@@ -9,7 +9,7 @@ use crate::{
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use meshmark_dataset::{
     formats::Format,
-    read_back::{Comparison, find_all},
+    read_back::{Comparison, Difference},
 };
 use std::path::Path;
 
@@ -39,31 +39,31 @@ pub fn check(written: &Written, view: &View, request: &Request, threads: usize) 
     let file = open(written)?;
     let meant = view.dataset();
     let mut vertices = Vec::new();
-    let mut widest = 0f64;
     for layer in &written.layers {
-        let magnitude = view.marking().moved().iter().flatten().fold(0f64, |most, v| most.max(v.abs()));
-        let tolerance = written.format.tolerance(&layer.options, magnitude);
+        let digits = written.format.digits(&layer.options);
         let keep = view.marking().marks_layer(&layer.staged).then_some(&mut vertices);
         let collector = Collector::new();
         let last_failure = || collector.first_failure();
-        let comparison = Comparison { tolerance, place: &Some, last_failure: &last_failure };
+        let comparison = Comparison { digits, place: &Some, last_failure: &last_failure };
         // The only layer of a file may bear the file's name.
         let in_file = match written.format.many_layers {
             true => file.layer_by_name(&layer.name),
             false => file.layer(0),
         };
         let compared = comparison.layers(meant.layer_by_name(&layer.staged), in_file, keep);
-        compared.map_err(|difference| not_kept(written, layer, &difference))?;
-        widest = widest.max(tolerance);
+        compared.map_err(|difference| not_kept(written, layer, difference))?;
     }
-    let found = find_all(view.marking().moved(), vertices, widest);
-    let found = found.ok_or_else(|| not_kept(written, &written.layers[0], "a vertex is missing"))?;
-    view.marking().check_message(request, &found, threads)
+    // A format with decimals holds one layer.
+    let digits = written.format.digits(&written.layers[0].options);
+    let found = digits.find_all(view.marking().moved(), vertices);
+    let found = found
+        .ok_or_else(|| not_kept(written, &written.layers[0], "a vertex is missing".to_string().into()))?;
+    view.marking().check_message(request, &found, digits, threads)
 }
 
-fn not_kept(written: &Written, layer: &WrittenLayer, difference: &str) -> Error {
+fn not_kept(written: &Written, layer: &WrittenLayer, difference: Difference) -> Error {
     let (driver, layer) = (written.format.driver, layer.name.clone());
-    meshmark_dataset::Error::NotKept { driver, layer, difference: difference.into() }.into()
+    meshmark_dataset::Error::NotKept { driver, layer, difference }.into()
 }
 
 fn open(written: &Written) -> Result<Dataset> {

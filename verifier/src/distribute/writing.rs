@@ -40,14 +40,13 @@ pub fn write(job: &Job, copy: &Copy, moved: &[[f64; 2]], distortion: Distortion)
 fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
     let driver = job.format.driver;
     let (staged, file) = (open(&job.staged.path, "GPKG")?, open(path, driver)?);
-    let magnitude = moves.to.iter().flatten().fold(0f64, |most, v| most.max(v.abs()));
     for number in 0..staged.layer_count() {
         let (meant, in_file) = (staged.layer(number), file.layer(number));
         let layer = meant.as_ref().map_or_else(|_| number.to_string(), LayerAccess::name);
         let moving = job.staged.layer(&layer);
         forget_failure();
         let comparison = Comparison {
-            tolerance: job.format.tolerance(&[], magnitude),
+            digits: job.format.digits(&[]),
             place: &|point| if moving.is_some() { moves.of(point) } else { Some(point) },
             last_failure: &last_failure,
         };
