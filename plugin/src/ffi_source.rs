@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
-    ffi_output::Feature,
+    ffi_features::Feature,
     marking::Marking,
     source_files::SourceFiles,
 };
