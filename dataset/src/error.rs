@@ -1,3 +1,4 @@
+use crate::read_back::OTHER_NUMBER;
 use meshmark_core::options::Spelling;
 use std::fmt;
 
@@ -124,6 +125,14 @@ impl Error {
             ),
             Error::Folder { driver } => {
                 format!("{driver} would make a folder of it: write one layer, or a GeoPackage")
+            }
+            Error::NotKept { driver: driver @ "FlatGeobuf", layer, difference }
+                if difference == OTHER_NUMBER =>
+            {
+                format!(
+                    "layer \"{layer}\": {driver} with a spatial index leaves out features without a geometry, and nothing is \
+                 written: leave them out of the map, or choose another format"
+                )
             }
             Error::NotKept { driver, layer, difference } => format!(
                 "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; choose \

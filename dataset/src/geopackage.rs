@@ -8,10 +8,16 @@ use std::borrow::Cow;
 /// How the names of tables begin that are the standard's, SQLite's, or those of spatial indexes.
 const RESERVED: [&str; 3] = ["gpkg", "sqlite_", "rtree_"];
 
+/// What GDAL lets no name of a GeoPackage's layer begin with.
+const NO_BEGINNING: &str = "`~!@#$%^&*()+-={}|[]\\:\";'<>?,./";
+
 /// The name under which a GeoPackage takes a layer of this name, which other formats may call as they like.
 pub fn safe_layer_name(name: &str) -> Cow<'_, str> {
     let begins = |start: &&str| name.get(..start.len()).is_some_and(|n| n.eq_ignore_ascii_case(start));
-    match name.is_empty() || RESERVED.iter().any(|start| begins(start)) {
+    match name.is_empty()
+        || name.starts_with(|c| NO_BEGINNING.contains(c))
+        || RESERVED.iter().any(|start| begins(start))
+    {
         true => format!("layer_{name}").into(),
         false => name.into(),
     }
@@ -75,9 +81,13 @@ mod tests {
 
     #[test]
     fn reserved_names_of_layers_get_another_beginning() {
-        for (name, safe) in
-            [("gpkg_a", "layer_gpkg_a"), ("SQLite_a", "layer_SQLite_a"), ("", "layer_"), ("ägpkg", "ägpkg")]
-        {
+        for (name, safe) in [
+            ("gpkg_a", "layer_gpkg_a"),
+            ("SQLite_a", "layer_SQLite_a"),
+            ("", "layer_"),
+            ("[a]", "layer_[a]"),
+            ("ägpkg", "ägpkg"),
+        ] {
             assert_eq!(safe_layer_name(name), safe);
         }
     }

@@ -8,6 +8,9 @@ use gdal::vector::{Feature, Layer, LayerAccess};
 use meshmark_core::vertices::VertexTable;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+/// What differs when features are missing, or there are more.
+pub(crate) const OTHER_NUMBER: &str = "another number of features";
+
 /// How to compare a layer of a file with what was meant.
 pub struct Comparison<'a> {
     /// How far a coordinate may be from what was meant, CRS units; 0: not one bit.
@@ -52,7 +55,7 @@ impl Comparison<'_> {
                     }
                 }
                 _ => {
-                    return Err((self.last_failure)().unwrap_or("another number of features".into()));
+                    return Err((self.last_failure)().unwrap_or(OTHER_NUMBER.into()));
                 }
             }
         }

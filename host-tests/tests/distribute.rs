@@ -175,7 +175,8 @@ fn in_any_order(mut features: Vec<FeatureContents>) -> Vec<FeatureContents> {
 fn names_that_geopackage_has_for_itself_are_names_like_others() {
     let host = host();
     let sql = "SELECT osm_id AS fid, 'x' AS geom, name AS ogr_style FROM buildings";
-    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "gpkg_a.shp", "map.gpkg", "-sql", sql]).succeeds();
+    host.run("ogr2ogr", &["-f", "GeoJSON", "buildings.geojson", "map.gpkg", "buildings"]).succeeds();
+    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "gpkg_a.shp", "buildings.geojson", "-sql", sql]).succeeds();
     for (format, ending) in [("ESRI Shapefile", "shp"), ("GeoJSON", "geojson"), ("FlatGeobuf", "fgb")] {
         let (plain, (_, stem)) = (format!("plain.{ending}"), RECIPIENTS[0]);
         host.run("ogr2ogr", &["-f", format, &plain, "gpkg_a.shp"]).succeeds();

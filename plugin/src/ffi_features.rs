@@ -96,7 +96,7 @@ impl FeatureRef<'_> {
 }
 
 /// GDAL's id of a feature that has none.
-const NULL_ID: i64 = -1;
+pub const NULL_ID: i64 = -1;
 
 /// A feature of our own.
 pub struct Feature(OGRFeatureH);

@@ -20,6 +20,9 @@ use std::{
 /// The configuration option for checking creation options.
 const VALIDATE: &CStr = c"GDAL_VALIDATE_CREATION_OPTIONS";
 
+/// The layer creation options by which `ogr2ogr` hands on the words of a GeoJSON file, its unmarked extent too.
+const NATIVE_WORDS: [&str; 2] = ["NATIVE_DATA", "NATIVE_MEDIA_TYPE"];
+
 /// What a layer is created with.
 pub struct LayerSpec {
     /// Its name.
@@ -38,8 +41,9 @@ impl LayerSpec {
         name: String,
         srs: OGRSpatialReferenceH,
         geometry: OGRwkbGeometryType::Type,
-        options: Vec<(String, String)>,
+        mut options: Vec<(String, String)>,
     ) -> Self {
+        options.retain(|(name, _)| !NATIVE_WORDS.iter().any(|native| native.eq_ignore_ascii_case(name)));
         // SAFETY: as the caller promises.
         let srs = Srs(if srs.is_null() { srs } else { unsafe { gdal_sys::OSRClone(srs) } });
         LayerSpec { name, geometry, options, srs }
@@ -83,8 +87,10 @@ impl Drop for Srs {
 /// What a field is created with.
 #[derive(Clone)]
 pub struct Field {
-    /// Its name.
+    /// Its name; what is not UTF-8 is replaced.
     pub name: String,
+    /// The bytes of its name, in whatever encoding.
+    c_name: CString,
     /// Its type.
     pub kind: OGRFieldType::Type,
     subkind: OGRFieldSubType::Type,
@@ -101,6 +107,7 @@ impl Field {
     /// A text field.
     pub fn text(name: String) -> Self {
         Field {
+            c_name: c_string(&name),
             name,
             kind: OGRFieldType::OFTString,
             subkind: OGRFieldSubType::OFSTNone,
@@ -122,6 +129,7 @@ impl Field {
             let string = |s: *const c_char| (!s.is_null() && *s != 0).then(|| CStr::from_ptr(s).to_owned());
             Field {
                 name: text(gdal_sys::OGR_Fld_GetNameRef(field)),
+                c_name: CStr::from_ptr(gdal_sys::OGR_Fld_GetNameRef(field)).to_owned(),
                 kind: gdal_sys::OGR_Fld_GetType(field),
                 subkind: gdal_sys::OGR_Fld_GetSubType(field),
                 width: gdal_sys::OGR_Fld_GetWidth(field),
@@ -181,10 +189,9 @@ impl Field {
     }
 
     fn with_handle<T>(&self, f: impl FnOnce(OGRFieldDefnH) -> T) -> T {
-        let name = c_string(&self.name);
         // SAFETY: the definition is made, used and destroyed here; its strings are copied.
         unsafe {
-            let field = gdal_sys::OGR_Fld_Create(name.as_ptr(), self.kind);
+            let field = gdal_sys::OGR_Fld_Create(self.c_name.as_ptr(), self.kind);
             gdal_sys::OGR_Fld_SetSubType(field, self.subkind);
             gdal_sys::OGR_Fld_SetWidth(field, self.width);
             gdal_sys::OGR_Fld_SetPrecision(field, self.precision);

@@ -6,7 +6,7 @@
 
 use crate::{
     error::{Error, Result},
-    ffi_features::{Feature, FeatureRef},
+    ffi_features::{Feature, FeatureRef, NULL_ID},
     ffi_output::{Field, LayerSpec, Output},
     ffi_source::View,
 };
@@ -36,8 +36,8 @@ pub struct StagedLayer {
     taken: Vec<String>,
     style_column: Option<usize>,
     lost_column: Option<usize>,
-    /// Whether the host numbered the features.
-    has_ids: bool,
+    /// How many features came before the first one that the host numbered.
+    before_ids: Option<usize>,
     last_id: i64,
     /// How many features there are.
     features: usize,
@@ -46,7 +46,7 @@ pub struct StagedLayer {
 /// What a GeoPackage would not give back of a feature.
 #[derive(Debug, PartialEq)]
 enum Lost {
-    /// Its id.
+    /// Its id, GDAL's null one when it has none.
     Id(i64),
     /// That a field is not set.
     Unset(usize),
@@ -74,7 +74,7 @@ impl StagedLayer {
         staged.add_layer(&spec.renamed(name.clone(), options.into()), true)?;
         let taken = [&id, &geometry, STYLE_COLUMN, LOST_COLUMN].map(str::to_lowercase).into();
         let (fields, columns, lists) = (Vec::new(), Vec::new(), Vec::new());
-        let (style_column, lost_column, has_ids, last_id, features) = (None, None, false, 0, 0);
+        let (style_column, lost_column, before_ids, last_id, features) = (None, None, None, 0, 0);
         Ok(StagedLayer {
             spec,
             name,
@@ -86,7 +86,7 @@ impl StagedLayer {
             taken,
             style_column,
             lost_column,
-            has_ids,
+            before_ids,
             last_id,
             features,
         })
@@ -116,10 +116,16 @@ impl StagedLayer {
     pub fn write(&mut self, staged: &Output, feature: FeatureRef) -> Result<i64> {
         let style = feature.style();
         let id = feature.id();
-        self.has_ids |= id.is_some();
+        if id.is_some() {
+            self.before_ids.get_or_insert(self.features);
+        }
         let keeps_id = id.is_some_and(|id| self.is_geopackage || id > self.last_id);
         let mut lost = if self.is_geopackage { Vec::new() } else { self.lost(feature) };
-        lost.extend(id.filter(|_| !keeps_id).map(Lost::Id));
+        match id {
+            Some(id) if !keeps_id => lost.push(Lost::Id(id)),
+            None if self.before_ids.is_some() && !self.is_geopackage => lost.push(Lost::Id(NULL_ID)),
+            _ => {}
+        }
         if style.is_some() && self.style_column.is_none() {
             self.style_column = Some(staged.field_count(self.number));
             staged.add_field(self.number, &Field::text(STYLE_COLUMN.into()), false, true)?;
@@ -180,7 +186,8 @@ impl StagedLayer {
             if let Some(column) = self.style_column {
                 feature.set_style(&marked.borrow().text(column));
             }
-            if let (true, Some(id)) = (self.has_ids, marked.borrow().id()) {
+            let has_id = self.before_ids.is_some_and(|before| self.is_geopackage || written >= before);
+            if let Some(id) = marked.borrow().id().filter(|_| has_id) {
                 feature.set_id(id);
             }
             let lost = self.lost_column.map(|column| marked.borrow().text(column)).unwrap_or_default();
