@@ -14,10 +14,7 @@ const NO_BEGINNING: &str = "`~!@#$%^&*()+-={}|[]\\:\";'<>?,./";
 /// The name under which a GeoPackage takes a layer of this name, which other formats may call as they like.
 pub fn safe_layer_name(name: &str) -> Cow<'_, str> {
     let begins = |start: &&str| name.get(..start.len()).is_some_and(|n| n.eq_ignore_ascii_case(start));
-    match name.is_empty()
-        || name.starts_with(|c| NO_BEGINNING.contains(c))
-        || RESERVED.iter().any(|start| begins(start))
-    {
+    match name.is_empty() || name.starts_with(|c| NO_BEGINNING.contains(c)) || RESERVED.iter().any(begins) {
         true => format!("layer_{name}").into(),
         false => name.into(),
     }

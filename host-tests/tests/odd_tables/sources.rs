@@ -289,7 +289,7 @@ fn value_of(kind: usize, number: usize, random: &mut ChaCha20Rng) -> Value {
         }
         3 => choice(random, &[json!(""), json!("a\nb"), json!("x".repeat(300)), json!("käsi \"x\" \\")])
             .clone(),
-        4 => json!(number % 2 == 0),
+        4 => json!(number.is_multiple_of(2)),
         5 => json!([number, -1]),
         6 => json!(["a,b", "(c)", ""]),
         7 => json!({"geometry": {"coordinates": [1, 2]}, "n": number}),
