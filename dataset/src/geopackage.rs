@@ -3,6 +3,22 @@
 
 use crate::wkb::{self, WkbError};
 use gdal::vector::Geometry;
+use std::borrow::Cow;
+
+/// How the names of tables begin that are the standard's, SQLite's, or those of spatial indexes.
+const RESERVED: [&str; 3] = ["gpkg", "sqlite_", "rtree_"];
+
+/// What GDAL lets no name of a GeoPackage's layer begin with.
+const NO_BEGINNING: &str = "`~!@#$%^&*()+-={}|[]\\:\";'<>?,./";
+
+/// The name under which a GeoPackage takes a layer of this name, which other formats may call as they like.
+pub fn safe_layer_name(name: &str) -> Cow<'_, str> {
+    let begins = |start: &&str| name.get(..start.len()).is_some_and(|n| n.eq_ignore_ascii_case(start));
+    match name.is_empty() || name.starts_with(|c| NO_BEGINNING.contains(c)) || RESERVED.iter().any(begins) {
+        true => format!("layer_{name}").into(),
+        false => name.into(),
+    }
+}
 
 /// A bounding box in the order of GeoPackages: least x, largest x, least y, largest y.
 pub type Bounds = [f64; 4];
@@ -58,6 +74,19 @@ mod tests {
         let mut blob = blob(kind, wkt);
         let bounds = map_coordinates::<WkbError>(&mut blob, &mut |[x, y]| Ok([x + 10.0, y - 10.0])).unwrap();
         (blob, bounds)
+    }
+
+    #[test]
+    fn reserved_names_of_layers_get_another_beginning() {
+        for (name, safe) in [
+            ("gpkg_a", "layer_gpkg_a"),
+            ("SQLite_a", "layer_SQLite_a"),
+            ("", "layer_"),
+            ("[a]", "layer_[a]"),
+            ("ägpkg", "ägpkg"),
+        ] {
+            assert_eq!(safe_layer_name(name), safe);
+        }
     }
 
     #[test]

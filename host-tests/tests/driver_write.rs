@@ -121,6 +121,16 @@ fn every_geometry_type_field_type_and_null_value_arrives() {
     assert_eq!(domain("out.gpkg"), domain(&source("shapes.gpkg")));
 }
 
+#[test]
+fn a_layer_may_bear_a_name_that_geopackage_reserves() {
+    let host = Host::new();
+    host.run("ogr2ogr", &["-f", "ESRI Shapefile", "gpkg_a.shp", &source("kotka.gpkg"), "buildings"])
+        .succeeds();
+    host.create("out.fgb", "gpkg_a.shp", &["-dsco", "LAYERS=gpkg_a"]).succeeds();
+    assert_eq!(contents::read(&host.path("out.fgb"))[0].name, "gpkg_a");
+    host.matches("ref.gpkg", &["--record", "record.json", "out.fgb"]);
+}
+
 /// Options for a small map.
 const SMALL: [&str; 4] = ["-dsco", "PATCH_SIZE=130", "-dsco", "MESSAGE=0123456789abcdef"];
 

@@ -3,27 +3,25 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
+    ffi_features::Feature,
     ffi_source::{strings, text},
 };
 use gdal_sys::{
-    GDALDatasetH, OGRErr, OGRFeatureH, OGRFieldDefnH, OGRFieldSubType, OGRFieldType, OGRLayerH,
-    OGRSpatialReferenceH, OGRwkbGeometryType,
+    GDALDatasetH, OGRErr, OGRFieldDefnH, OGRFieldSubType, OGRFieldType, OGRLayerH, OGRSpatialReferenceH,
+    OGRwkbGeometryType,
 };
 use std::{
     ffi::{CStr, CString, c_char, c_int},
-    marker::PhantomData,
     mem::ManuallyDrop,
     path::Path,
     ptr,
 };
 
-unsafe extern "C" {
-    /// A list field as a JSON array; the caller frees it.
-    fn meshmark_shim_list_as_json(feature: OGRFeatureH, field: c_int) -> *mut c_char;
-}
-
 /// The configuration option for checking creation options.
 const VALIDATE: &CStr = c"GDAL_VALIDATE_CREATION_OPTIONS";
+
+/// The layer creation options by which `ogr2ogr` hands on the words of a GeoJSON file, its unmarked extent too.
+const NATIVE_WORDS: [&str; 2] = ["NATIVE_DATA", "NATIVE_MEDIA_TYPE"];
 
 /// What a layer is created with.
 pub struct LayerSpec {
@@ -43,8 +41,9 @@ impl LayerSpec {
         name: String,
         srs: OGRSpatialReferenceH,
         geometry: OGRwkbGeometryType::Type,
-        options: Vec<(String, String)>,
+        mut options: Vec<(String, String)>,
     ) -> Self {
+        options.retain(|(name, _)| !NATIVE_WORDS.iter().any(|native| native.eq_ignore_ascii_case(name)));
         // SAFETY: as the caller promises.
         let srs = Srs(if srs.is_null() { srs } else { unsafe { gdal_sys::OSRClone(srs) } });
         LayerSpec { name, geometry, options, srs }
@@ -67,10 +66,10 @@ impl LayerSpec {
         }
     }
 
-    /// The same layer with other options.
-    pub fn with_options(&self, options: Vec<(String, String)>) -> Self {
+    /// The same layer with another name and other options.
+    pub fn renamed(&self, name: String, options: Vec<(String, String)>) -> Self {
         // SAFETY: the spatial reference is null or ours.
-        unsafe { Self::new(self.name.clone(), self.srs.0, self.geometry, options) }
+        unsafe { Self::new(name, self.srs.0, self.geometry, options) }
     }
 }
 
@@ -88,8 +87,10 @@ impl Drop for Srs {
 /// What a field is created with.
 #[derive(Clone)]
 pub struct Field {
-    /// Its name.
+    /// Its name; what is not UTF-8 is replaced.
     pub name: String,
+    /// The bytes of its name, in whatever encoding.
+    c_name: CString,
     /// Its type.
     pub kind: OGRFieldType::Type,
     subkind: OGRFieldSubType::Type,
@@ -106,6 +107,7 @@ impl Field {
     /// A text field.
     pub fn text(name: String) -> Self {
         Field {
+            c_name: c_string(&name),
             name,
             kind: OGRFieldType::OFTString,
             subkind: OGRFieldSubType::OFSTNone,
@@ -127,6 +129,7 @@ impl Field {
             let string = |s: *const c_char| (!s.is_null() && *s != 0).then(|| CStr::from_ptr(s).to_owned());
             Field {
                 name: text(gdal_sys::OGR_Fld_GetNameRef(field)),
+                c_name: CStr::from_ptr(gdal_sys::OGR_Fld_GetNameRef(field)).to_owned(),
                 kind: gdal_sys::OGR_Fld_GetType(field),
                 subkind: gdal_sys::OGR_Fld_GetSubType(field),
                 width: gdal_sys::OGR_Fld_GetWidth(field),
@@ -164,6 +167,16 @@ impl Field {
         }
     }
 
+    /// Whether it holds a number with fractions.
+    pub fn is_real(&self) -> bool {
+        self.kind == OGRFieldType::OFTReal
+    }
+
+    /// Whether it holds a text.
+    pub fn is_text(&self) -> bool {
+        self.kind == OGRFieldType::OFTString
+    }
+
     /// Whether it holds several values.
     pub fn is_list(&self) -> bool {
         matches!(
@@ -176,10 +189,9 @@ impl Field {
     }
 
     fn with_handle<T>(&self, f: impl FnOnce(OGRFieldDefnH) -> T) -> T {
-        let name = c_string(&self.name);
         // SAFETY: the definition is made, used and destroyed here; its strings are copied.
         unsafe {
-            let field = gdal_sys::OGR_Fld_Create(name.as_ptr(), self.kind);
+            let field = gdal_sys::OGR_Fld_Create(self.c_name.as_ptr(), self.kind);
             gdal_sys::OGR_Fld_SetSubType(field, self.subkind);
             gdal_sys::OGR_Fld_SetWidth(field, self.width);
             gdal_sys::OGR_Fld_SetPrecision(field, self.precision);
@@ -340,20 +352,22 @@ impl Output {
     /// A new feature of a layer.
     pub fn feature(&self, layer: usize) -> Feature {
         // SAFETY: the definition outlives the feature: GDAL counts references to it.
-        Feature(unsafe { gdal_sys::OGR_F_Create(gdal_sys::OGR_L_GetLayerDefn(self.layers[layer])) })
+        unsafe {
+            Feature::from_handle(gdal_sys::OGR_F_Create(gdal_sys::OGR_L_GetLayerDefn(self.layers[layer])))
+        }
     }
 
     /// Writes a feature; its id.
     pub fn write(&self, layer: usize, feature: &Feature, quiet: bool) -> Result<i64> {
         let collector = Collector::new();
         // SAFETY: the layer and the feature are open.
-        let error = unsafe { gdal_sys::OGR_L_CreateFeature(self.layers[layer], feature.0) };
+        let error = unsafe { gdal_sys::OGR_L_CreateFeature(self.layers[layer], feature.handle()) };
         check(error, || "writing it".into(), &collector)?;
         if !quiet {
             collector.release();
         }
         // SAFETY: the feature is ours.
-        Ok(unsafe { gdal_sys::OGR_F_GetFID(feature.0) })
+        Ok(unsafe { gdal_sys::OGR_F_GetFID(feature.handle()) })
     }
 
     /// Takes the field domains of another dataset.
@@ -453,126 +467,11 @@ impl Described {
     }
 }
 
-/// A feature of somebody else.
-#[derive(Clone, Copy)]
-pub struct FeatureRef<'a>(OGRFeatureH, PhantomData<&'a ()>);
-
-impl FeatureRef<'_> {
-    /// # Safety
-    /// The feature stays while this lives.
-    pub unsafe fn new(feature: OGRFeatureH) -> Self {
-        FeatureRef(feature, PhantomData)
-    }
-
-    /// Its id, when it has one.
-    pub fn id(&self) -> Option<i64> {
-        // SAFETY: the feature is there.
-        Some(unsafe { gdal_sys::OGR_F_GetFID(self.0) }).filter(|&id| id != NULL_ID)
-    }
-
-    /// Gives it the id under which it was written.
-    pub fn set_id(&self, id: i64) {
-        // SAFETY: the feature is there.
-        unsafe { gdal_sys::OGR_F_SetFID(self.0, id) };
-    }
-
-    /// How many fields it has.
-    pub fn field_count(&self) -> usize {
-        // SAFETY: the feature is there.
-        unsafe { gdal_sys::OGR_F_GetFieldCount(self.0) as usize }
-    }
-
-    /// How it shall look, where that is said.
-    pub fn style(&self) -> Option<String> {
-        // SAFETY: the feature is there; the style is null or a C string.
-        Some(unsafe { text(gdal_sys::OGR_F_GetStyleString(self.0)) }).filter(|style| !style.is_empty())
-    }
-
-    /// A text field's value; empty when it has none.
-    pub fn text(&self, field: usize) -> String {
-        // SAFETY: the feature is there, GDAL checks the index, and the value is a C string.
-        unsafe { text(gdal_sys::OGR_F_GetFieldAsString(self.0, field as c_int)) }
-    }
-}
-
-/// GDAL's id of a feature that has none.
-const NULL_ID: i64 = -1;
-
-/// A feature of our own.
-pub struct Feature(OGRFeatureH);
-
-impl Feature {
-    /// # Safety
-    /// The feature is the caller's to destroy.
-    pub unsafe fn from_handle(feature: OGRFeatureH) -> Self {
-        Feature(feature)
-    }
-
-    /// For reading.
-    pub fn borrow(&self) -> FeatureRef<'_> {
-        FeatureRef(self.0, PhantomData)
-    }
-
-    /// Takes geometry and attributes of another feature; `map` has for each of its fields the number of the
-    /// field here, or none; those of `lists` become JSON.
-    pub fn copy_from(&self, other: FeatureRef, map: &[Option<usize>], lists: &[usize]) -> Result<()> {
-        if map.len() != other.field_count() {
-            let reason = format!("it has {} fields, its layer {}", other.field_count(), map.len());
-            return Err(Error::Writing { what: "copying its attributes".into(), reason });
-        }
-        let collector = Collector::new();
-        let to = |(i, to): (usize, &Option<usize>)| match to {
-            Some(to) if !lists.contains(&i) => *to as c_int,
-            _ => -1,
-        };
-        let indices: Vec<c_int> = map.iter().enumerate().map(to).collect();
-        // SAFETY: both features are there, and the map is as long as the fields of the other.
-        let error = unsafe { gdal_sys::OGR_F_SetFromWithMap(self.0, other.0, 0, indices.as_ptr()) };
-        check(error, || "copying its attributes".into(), &collector)?;
-        for &list in lists {
-            let Some(to) = map[list] else { continue };
-            // SAFETY: GDAL checks the indices; the text is ours to free.
-            unsafe {
-                let json = meshmark_shim_list_as_json(other.0, list as c_int);
-                if !json.is_null() {
-                    gdal_sys::OGR_F_SetFieldString(self.0, to as c_int, json);
-                    gdal_sys::VSIFree(json.cast());
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Sets its id.
-    pub fn set_id(&self, id: i64) {
-        self.borrow().set_id(id);
-    }
-
-    /// Sets its style.
-    pub fn set_style(&self, style: &str) {
-        // SAFETY: the feature is ours, and the text is copied.
-        unsafe { gdal_sys::OGR_F_SetStyleString(self.0, c_string(style).as_ptr()) };
-    }
-
-    /// Sets a field to a text.
-    pub fn set_text(&self, field: usize, value: &str) {
-        // SAFETY: the feature is ours, GDAL checks the index, and the text is copied.
-        unsafe { gdal_sys::OGR_F_SetFieldString(self.0, field as c_int, c_string(value).as_ptr()) };
-    }
-}
-
-impl Drop for Feature {
-    fn drop(&mut self) {
-        // SAFETY: the feature is ours.
-        unsafe { gdal_sys::OGR_F_Destroy(self.0) };
-    }
-}
-
-fn c_string(text: &str) -> CString {
+pub(crate) fn c_string(text: &str) -> CString {
     CString::new(text).expect("it was a C string")
 }
 
-fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
+pub(crate) fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
     match error {
         OGRErr::OGRERR_NONE => Ok(()),
         _ => Err(failure(what(), collector)),

@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
-    ffi_output::Feature,
+    ffi_features::Feature,
     marking::Marking,
     source_files::SourceFiles,
 };
@@ -247,7 +247,10 @@ unsafe fn ignore_attributes(layer: OGRLayerH) {
         let definition = gdal_sys::OGR_L_GetLayerDefn(layer);
         let fields = 0..gdal_sys::OGR_FD_GetFieldCount(definition);
         let name = |i| gdal_sys::OGR_Fld_GetNameRef(gdal_sys::OGR_FD_GetFieldDefn(definition, i));
-        let mut names: Vec<*const c_char> = fields.map(name).collect();
+        // To GDAL this name is that of the geometry, whatever fields there are.
+        let is_field =
+            |name: &*const c_char| !CStr::from_ptr(*name).to_bytes().eq_ignore_ascii_case(b"OGR_GEOMETRY");
+        let mut names: Vec<*const c_char> = fields.map(name).filter(is_field).collect();
         names.extend([c"OGR_STYLE".as_ptr(), ptr::null()]);
         gdal_sys::OGR_L_SetIgnoredFields(layer, names.as_mut_ptr());
     }

@@ -18,6 +18,7 @@
 mod error;
 mod ffi;
 mod ffi_errors;
+mod ffi_features;
 mod ffi_output;
 mod ffi_source;
 mod ffi_writer;
@@ -26,5 +27,6 @@ mod output;
 mod read_back;
 mod record_file;
 mod source_files;
+mod staged_layer;
 mod target;
 mod writer;

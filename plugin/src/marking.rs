@@ -68,6 +68,15 @@ impl Request {
         Ok(Request { options, subject, key, key_path })
     }
 
+    /// Makes it choose layers by the names they have where they are staged; those that have none are left to be found missing.
+    pub fn rename_layers<'a>(&mut self, staged: impl Fn(&str) -> Option<&'a str>) {
+        for name in self.options.layers.iter_mut().flatten() {
+            if let Some(staged) = staged(name) {
+                *name = staged.into();
+            }
+        }
+    }
+
     /// Where the record shall go.
     pub fn record_path(&self) -> Option<&Path> {
         self.options.record_path.as_deref().map(Path::new)

@@ -10,10 +10,12 @@
 
 use crate::{
     error::{Error, Result},
-    ffi_output::{Described, Feature, FeatureRef, Field, LayerSpec, Output},
+    ffi_features::FeatureRef,
+    ffi_output::{Described, Field, LayerSpec, Output},
     ffi_source::{OwnedSource, View},
     marking::{Marking, Request},
     read_back,
+    staged_layer::StagedLayer,
     target::{Places, Target},
 };
 use meshmark_dataset::{
@@ -21,9 +23,6 @@ use meshmark_dataset::{
     workplace::file_error,
 };
 use std::{fs, path::Path};
-
-/// The column of the staging GeoPackage for the styles of features, made when the first one has a style.
-const STYLE_COLUMN: &str = "OGR_STYLE";
 
 /// Marks an open dataset; the border knows how.
 pub type Mark<'a> = &'a dyn Fn(&Request, &OwnedSource) -> Result<Marking>;
@@ -40,19 +39,6 @@ pub struct Writer {
     /// Why nothing will be published.
     failed: Option<String>,
     places: Places,
-}
-
-struct StagedLayer {
-    spec: LayerSpec,
-    /// For every field of the layer, the one of the staging GeoPackage.
-    columns: Vec<Option<usize>>,
-    /// Fields with several values each.
-    lists: Vec<usize>,
-    /// Names in the staging GeoPackage, lower case.
-    taken: Vec<String>,
-    style_column: Option<usize>,
-    /// Whether the host numbered the features.
-    has_ids: bool,
 }
 
 impl Writer {
@@ -91,22 +77,9 @@ impl Writer {
             }
             writer.schema.add_layer(&spec, false)?;
             let number = writer.layers.len();
-            let [_, id, geometry] = writer.schema.names(number);
-            let or = |name: String, default: &str| if name.is_empty() { default.into() } else { name };
-            let (id, geometry) = (or(id, "fid"), or(geometry, "geom"));
-            let options = [("FID", &id), ("GEOMETRY_NAME", &geometry), ("SPATIAL_INDEX", &"NO".to_string())];
-            let options = options.map(|(name, value)| (name.to_string(), value.clone()));
-            writer.staged.add_layer(&spec.with_options(options.into()), true)?;
-            let taken = [&id, &geometry, STYLE_COLUMN].map(str::to_lowercase).into();
-            let (columns, lists) = (Vec::new(), Vec::new());
-            writer.layers.push(StagedLayer {
-                spec,
-                columns,
-                lists,
-                taken,
-                style_column: None,
-                has_ids: false,
-            });
+            let is_geopackage = writer.is_geopackage();
+            let layer = StagedLayer::new(spec, number, &writer.schema, &mut writer.staged, is_geopackage)?;
+            writer.layers.push(layer);
             let fields = writer.schema.fields(number);
             fields.iter().try_for_each(|field| writer.stage_field(number, field, &field.name))?;
             Ok(number)
@@ -124,35 +97,18 @@ impl Writer {
         })
     }
 
-    fn stage_field(&mut self, number: usize, field: &Field, name: &str) -> Result<()> {
-        let layer = &mut self.layers[number];
-        let mut unique = name.to_string();
-        let mut copy = 2;
-        while layer.taken.contains(&unique.to_lowercase()) {
-            unique = format!("{name}_{copy}");
-            copy += 1;
-        }
-        layer.taken.push(unique.to_lowercase());
-        let column = self.staged.field_count(number);
-        self.staged.add_field(
-            number,
-            &field.staged(unique, self.target.format.driver == "GPKG"),
-            true,
-            true,
-        )?;
-        if field.is_list() {
-            layer.lists.push(layer.columns.len());
-        }
-        layer.columns.push(Some(column));
-        Ok(())
+    fn stage_field(&mut self, layer: usize, field: &Field, name: &str) -> Result<()> {
+        self.layers[layer].add_field(&self.staged, field, name)
+    }
+
+    fn is_geopackage(&self) -> bool {
+        self.target.format.driver == "GPKG"
     }
 
     /// Stages a feature and gives it its id.
     pub fn write(&mut self, layer: usize, feature: FeatureRef) -> Result<()> {
         self.keep_failure(|writer| {
-            let quiet = writer.target.format.driver != "GPKG"; // complaints of GeoPackage are not the format's
-            let staged = writer.layers[layer].stage(&writer.staged, layer, feature)?;
-            let id = writer.staged.write(layer, &staged, quiet)?;
+            let id = writer.layers[layer].write(&writer.staged, feature)?;
             feature.set_id(id);
             Ok(())
         })
@@ -200,7 +156,10 @@ impl Writer {
             return Err(Error::Unfinished(reason));
         }
         // Dropped in reverse order: datasets before the folders they are in.
-        let Writer { places, target, request, layers, schema, staged, .. } = self;
+        let Writer { places, target, mut request, layers, schema, staged, .. } = self;
+        request.rename_layers(|name| {
+            layers.iter().find(|layer| layer.spec.name == name).map(|layer| &*layer.name)
+        });
         staged.describe(described);
         (0..layers.len()).for_each(|layer| staged.describe_layer(layer, described));
         staged.commit()?;
@@ -228,39 +187,6 @@ impl Writer {
     }
 }
 
-impl StagedLayer {
-    /// The feature as the staging GeoPackage keeps it.
-    fn stage(&mut self, staged: &Output, number: usize, feature: FeatureRef) -> Result<Feature> {
-        let style = feature.style();
-        if style.is_some() && self.style_column.is_none() {
-            self.style_column = Some(staged.field_count(number));
-            staged.add_field(number, &Field::text(STYLE_COLUMN.into()), false, true)?;
-        }
-        let copy = staged.feature(number);
-        copy.copy_from(feature, &self.columns, &self.lists)?;
-        if let (Some(column), Some(style)) = (self.style_column, style) {
-            copy.set_text(column, &style);
-        }
-        if let Some(id) = feature.id() {
-            self.has_ids = true;
-            copy.set_id(id);
-        }
-        Ok(copy)
-    }
-
-    /// For every column of the staging GeoPackage, the field of the layer.
-    fn fields_of_columns(&self) -> Vec<Option<usize>> {
-        let last = self.columns.iter().flatten().copied().chain(self.style_column).max();
-        let mut fields = vec![None; last.map_or(0, |last| last + 1)];
-        for (field, column) in self.columns.iter().enumerate() {
-            if let Some(column) = *column {
-                fields[column] = Some(field);
-            }
-        }
-        fields
-    }
-}
-
 /// Writes all marked layers by the real driver, one after the other; their names in it.
 fn write_marked(
     path: &Path,
@@ -283,21 +209,10 @@ fn write_marked(
         for field in schema.fields(number).iter().skip(output.field_count(number)) {
             output.add_field(number, field, true, true)?;
         }
-        let fields = layer.fields_of_columns();
-        view.for_each(&layer.spec.name, |marked| {
-            let feature = output.feature(number);
-            feature.copy_from(marked.borrow(), &fields, &[])?;
-            if let Some(column) = layer.style_column {
-                feature.set_style(&marked.borrow().text(column));
-            }
-            if let (true, Some(id)) = (layer.has_ids, marked.borrow().id()) {
-                feature.set_id(id);
-            }
-            output.write(number, &feature, true).map(drop)
-        })?;
+        layer.write_marked(view, &output)?;
         let [name, ..] = output.names(number);
         let options = layer.spec.options.clone();
-        written.push(read_back::WrittenLayer { staged: layer.spec.name.clone(), name, options });
+        written.push(read_back::WrittenLayer { staged: layer.name.clone(), name, options });
     }
     if target.format.many_layers {
         output.commit()?;

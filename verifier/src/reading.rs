@@ -111,8 +111,12 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, &dataset, reading, Target::Own)
 }
 
-/// Reads the vertices of a map to be marked.
-pub(crate) fn source(path: &Path, options: &Options, warn: &mut dyn FnMut(&str)) -> Result<Survey> {
+/// Opens a map to be marked, and reads its vertices.
+pub(crate) fn source(
+    path: &Path,
+    options: &Options,
+    warn: &mut dyn FnMut(&str),
+) -> Result<(Dataset, Survey)> {
     if path.as_os_str().as_encoded_bytes().get(..9).is_some_and(|p| p.eq_ignore_ascii_case(b"MESHMARK:")) {
         let path = path.display();
         return Err(Error::Usage(format!(
@@ -120,22 +124,11 @@ pub(crate) fn source(path: &Path, options: &Options, warn: &mut dyn FnMut(&str))
         )));
     }
     let dataset = open("map", path, None)?;
-    let survey =
-        read("map", path, &dataset, &Reading { geometries: true, ..reading_of(options) }, Target::Own)?;
-    marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
-    Ok(survey)
-}
-
-/// Reads the vertices and the names of all layers of a copy of such a map.
-pub(crate) fn staged(path: &Path, options: &Options) -> Result<(Survey, Vec<String>)> {
-    let dataset = open("copy", path, Some(&["GPKG"]))?;
-    let survey = read("copy", path, &dataset, &reading_of(options), Target::Own)?;
-    Ok((survey, dataset.layers().map(|layer| layer.name()).collect()))
-}
-
-fn reading_of(options: &Options) -> Reading<'_> {
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
-    Reading { layers, srs, landmarks: LabelFields::None, geometries: false }
+    let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
+    let survey = read("map", path, &dataset, &reading, Target::Own)?;
+    marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
+    Ok((dataset, survey))
 }
 
 /// The geometries of a map in order, for a comparison, and the first CRS of a layer.

@@ -2,17 +2,22 @@
 //!
 //! ```text
 //! map ──survey──> vertices ──core::embedding──> displacements of a batch of recipients
-//!  └──ogr2ogr──> staged GeoPackage ──a thread each──> copy ─> moved in place ─> read back ─> published with its record
+//!  ├──> staged GeoPackage ──a thread each──> moved in place ─┐
+//!  └──ogr2ogr──> plain copy, for formats other than GPKG ────┴> copy ─> read back ─> published with its record
 //! ```
 //!
 //! A copy that is there is complete; the same command again makes those that are not.
 
 mod copies;
+mod flatgeobuf;
+mod geojson;
 mod moving;
 mod ogr2ogr;
+mod plain;
 mod recipients;
 mod spatial_index;
 mod staged;
+mod staging;
 mod writing;
 
 use crate::{Error, Result, progress::Progress, reading};
@@ -25,13 +30,13 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError, Survey, ThreadPool,
+    Survey, ThreadPool,
     formats::Format,
     marking::{self, Unmarked},
-    parse_srs, threads,
+    threads,
     workplace::Workplace,
 };
-use staged::Staged;
+use staging::Stage;
 use std::{
     collections::BTreeSet,
     fs,
@@ -75,8 +80,7 @@ struct Job<'a> {
     unmarked: Unmarked<'a>,
     reference: Reference,
     format: &'static Format,
-    /// The GeoPackage with the unmarked map.
-    staged: &'a Staged,
+    stage: &'a Stage,
     folder: &'a Path,
     /// What was said while copies were written, each once.
     warnings: Mutex<BTreeSet<String>>,
@@ -91,7 +95,7 @@ pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnM
     let made = make_folder(folder)?;
     let done = Workplace::new(folder).map_err(Error::from).and_then(|workplace| {
         progress.start("reading", 0);
-        let map = reading::source(&request.map, options, warn)?;
+        let (dataset, map) = reading::source(&request.map, options, warn)?;
         let mut copies: Vec<Copy> =
             recipients.into_iter().map(|recipient| Copy::new(recipient, folder, format)).collect();
         let all = copies.len();
@@ -101,8 +105,9 @@ pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnM
         let mut finished = finished.into_iter();
         copies.retain(|_| !finished.next().expect("one of each"));
         if !copies.is_empty() {
-            let staged = stage(request, format, &map, &workplace, progress, warn)?;
-            run(request, &map, (format, &staged), &copies, progress, warn)?;
+            progress.start("copying", 0);
+            let stage = Stage::new(request, format, (&dataset, &map), &workplace, warn)?;
+            run(request, &map, (format, &stage), &copies, progress, warn)?;
         }
         Ok(Summary { written: copies.len(), finished_before: all - copies.len() })
     });
@@ -122,52 +127,11 @@ fn make_folder(folder: &Path) -> Result<bool> {
     })
 }
 
-/// Copies the map to a GeoPackage, which is the source of all copies.
-fn stage(
-    request: &Request,
-    format: &'static Format,
-    map: &Survey,
-    workplace: &Workplace,
-    progress: &mut Progress,
-    warn: &mut dyn FnMut(&str),
-) -> Result<Staged> {
-    progress.start("copying", 0);
-    let staged = workplace.folder().join("staged.gpkg");
-    let mut options = vec!["-lco", "SPATIAL_INDEX=YES"];
-    options.extend(marking::OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]));
-    ogr2ogr::copy("GPKG", &request.map, &staged, &options)?.iter().for_each(|text| warn(text));
-    let (again, layers) = reading::staged(&staged, &request.options)?;
-    if again.vertices.digest() != map.vertices.digest() {
-        return Err(Error::Unreadable(format!(
-            "the map {} has other coordinates as a GeoPackage, or was changed while it was read: convert it to a \
-             GeoPackage, and distribute that",
-            request.map.display()
-        )));
-    }
-    let driver = format.driver;
-    let refused = |error: MapError| {
-        Err(Error::Usage(format!("the map {}: {}", request.map.display(), error.text(Spelling::Flag))))
-    };
-    if layers.len() > 1 && !format.many_layers {
-        return refused(MapError::OneLayer { driver });
-    }
-    let is_wgs84 =
-        map.crs.as_ref().is_none_or(|crs| parse_srs("EPSG:4326").is_ok_and(|wgs84| crs.is_same(&wgs84)));
-    if let (true, false, Some(layer)) = (format.is_wgs84_only(&[]), is_wgs84, layers.into_iter().next()) {
-        return refused(MapError::NotWgs84 { driver, layer });
-    }
-    let marks = |name: &str| {
-        let layers = request.options.layers.as_ref();
-        layers.is_none_or(|layers| layers.iter().any(|layer| layer == name))
-    };
-    Staged::read(staged, &map.vertices, marks)
-}
-
 /// Marks and writes, batch by batch.
 fn run(
     request: &Request,
     survey: &Survey,
-    (format, staged): (&'static Format, &Staged),
+    (format, stage): (&'static Format, &Stage),
     copies: &[Copy],
     progress: &mut Progress,
     warn: &mut dyn FnMut(&str),
@@ -191,7 +155,7 @@ fn run(
     let unmarked = pool.install(|| Unmarked::new(geometries, &map));
     let vertices = &survey.vertices;
     let warnings = Mutex::default();
-    let job = Job { key, options, vertices, unmarked, reference, format, staged, folder, warnings };
+    let job = Job { key, options, vertices, unmarked, reference, format, stage, folder, warnings };
     let mut written = 0;
     for batch in copies.chunks(embedding.batch()) {
         progress.start("solving patches", embedding.patches() as u64);

@@ -25,7 +25,9 @@ pub fn write(staged: &Staged, path: &Path, to: &[[f64; 2]]) -> Result<()> {
         connection.execute_batch(BEGIN)?;
         for layer in &staged.layers {
             let bounds = move_geometries(&connection, layer, to)?;
-            spatial_index::fit(&connection, layer, &bounds)?;
+            if layer.has_index {
+                spatial_index::fit(&connection, layer, &bounds)?;
+            }
             set_extent(&connection, layer, &bounds)?;
         }
         connection.execute_batch("COMMIT")?;

@@ -2,7 +2,9 @@
 //! subtypes, defaults, domains, metadata.
 
 use crate::{Error, Result};
+use meshmark_dataset::marking;
 use std::{
+    collections::HashMap,
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
@@ -13,6 +15,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
     // A GeoJSON file may say in its own words what extent it had.
     command
         .args(["-f", format, "-noNativeData"])
+        .args(marking::OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]))
         .args(options)
         .arg(named(to))
         .arg(named(from))
@@ -26,14 +29,40 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
         let lines = text.lines().filter_map(|line| line.strip_prefix(kind)?.split_once(": "));
         lines.map(|(_, text)| text.into()).collect()
     };
+    let [warnings, errors] = ["Warning ", "ERROR "].map(said);
     if output.status.success() {
-        return Ok(said("Warning ")
+        // An error with which it goes on is a warning here.
+        let texts = warnings.into_iter().chain(errors);
+        return Ok(grouped(texts)
             .into_iter()
             .map(|text| format!("ogr2ogr: {}", nameless(text, to)))
             .collect());
     }
-    let reason = said("ERROR ").into_iter().next().unwrap_or_else(|| output.status.to_string());
-    Err(Error::Unreadable(format!("{} cannot be copied to {format}: {reason}", from.display())))
+    let reason = errors.into_iter().next().unwrap_or_else(|| output.status.to_string());
+    Err(Error::Unreadable(format!("ogr2ogr cannot copy {} to {format}: {reason}", from.display())))
+}
+
+/// The first of all texts that differ in numbers alone, such as those of features, and how many more there are.
+fn grouped(texts: impl Iterator<Item = String>) -> Vec<String> {
+    let (mut groups, mut known): (Vec<(String, usize)>, HashMap<String, usize>) = Default::default();
+    for text in texts {
+        let group = *known.entry(without_numbers(&text)).or_insert(groups.len());
+        match groups.get_mut(group) {
+            Some((_, more)) => *more += 1,
+            None => groups.push((text, 0)),
+        }
+    }
+    let said = |(text, more): (String, usize)| match more {
+        0 => text,
+        _ => format!("{text} (and {more} more like this)"),
+    };
+    groups.into_iter().map(said).collect()
+}
+
+/// What is in quotes is a name, and counts.
+fn without_numbers(text: &str) -> String {
+    let is_number = |word: &str| word.trim_end_matches(['.', ',', ':', ';']).parse::<f64>().is_ok();
+    text.split(' ').map(|word| if is_number(word) { "0" } else { word }).collect::<Vec<_>>().join(" ")
 }
 
 /// Without the folder of a file that nobody is to look for.
@@ -46,5 +75,23 @@ fn named(path: &Path) -> PathBuf {
     match path.as_os_str().as_encoded_bytes().first() {
         Some(b'-') => Path::new(".").join(path),
         _ => path.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn warnings_that_differ_in_numbers_are_one() {
+        let texts = [
+            "value 1 of feature 7: cut",
+            "name 'a1' to 'b'",
+            "value 2.5 of feature 8: cut",
+            "name 'a2' to 'b'",
+        ];
+        let expected =
+            ["value 1 of feature 7: cut (and 1 more like this)", "name 'a1' to 'b'", "name 'a2' to 'b'"];
+        assert_eq!(grouped(texts.iter().map(|text| text.to_string())), expected);
     }
 }

@@ -6,6 +6,28 @@ use std::{collections::BTreeSet, fs::File, io::Read, path::Path};
 
 const HEADER: &str = "recipient";
 
+/// What else a header may be called, in any case and in the plural too. In a list of one column such a word could be
+/// somebody's name.
+const LIKE_HEADERS: &[&str] = &[
+    "recipient name",
+    "recipient_name",
+    "name",
+    "customer",
+    "client",
+    "company",
+    "organisation",
+    "organization",
+    "licensee",
+    "user",
+    "person",
+    "contact",
+    "receiver",
+    "addressee",
+    "partner",
+    "buyer",
+    "subscriber",
+];
+
 /// What spreadsheets put between columns.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
 
@@ -26,7 +48,7 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     let rows = rows(text).map_err(&bad)?;
     let column = match rows.first() {
         None => return Err(bad("is empty: write one recipient a line".into())),
-        Some((_, first)) => first.iter().position(is_header),
+        Some((line, first)) => column(*line, first).map_err(&bad)?,
     };
     if let (None, Some((line, row))) = (column, rows.iter().find(|(_, row)| row.len() > 1)) {
         return Err(bad(format!(
@@ -60,8 +82,40 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     }
 }
 
+/// Which column of the first row is headed as that of the recipients; none without a header.
+fn column(line: usize, first: &StringRecord) -> std::result::Result<Option<usize>, String> {
+    let mut headers = first.iter().enumerate().filter(|(_, field)| is_header(field));
+    match (headers.next(), headers.next()) {
+        (Some(_), Some(_)) => {
+            Err(format!("has two columns headed \"{HEADER}\" in line {line}: give one of them another name"))
+        }
+        (Some((column, _)), None) => Ok(Some(column)),
+        (None, _) if first.len() == 1 && reads_like_a_header(&first[0]) => Err(format!(
+            "begins with \"{}\" in line {line}, which may be a header or a recipient: head the column \"{HEADER}\", in \
+             place of that line or above it",
+            &first[0]
+        )),
+        (None, _) => Ok(None),
+    }
+}
+
 fn is_header(field: &str) -> bool {
-    field.eq_ignore_ascii_case(HEADER)
+    word(field) == HEADER
+}
+
+fn reads_like_a_header(field: &str) -> bool {
+    LIKE_HEADERS.contains(&word(field).as_str())
+}
+
+/// A header's word in lower case and the singular, without what may stand around it.
+fn word(field: &str) -> String {
+    let is_around = |c: char| c.is_whitespace() || "#:*\"'".contains(c);
+    let word = field.trim_matches(is_around).to_lowercase();
+    let singular = word.strip_suffix("(s)").or_else(|| word.strip_suffix('s')).unwrap_or(&word);
+    match singular.strip_suffix("ie") {
+        Some(stem) => format!("{stem}y"), // companies
+        None => singular.into(),
+    }
 }
 
 /// Lines and what they hold, separated by what makes a header of the first one, else by commas.
@@ -125,6 +179,10 @@ mod tests {
             "id,recipient\n1,ACME GmbH\n2,\"Öster AB\"\n",
             "id;recipient;note\n1;ACME GmbH;a, b\n;;\n2;Öster AB\n",
             "recipient\tid\nACME GmbH\t1\nÖster AB\t2\n",
+            "recipients\nACME GmbH\nÖster AB\n",
+            "# RECIPIENTS:\nACME GmbH\nÖster AB\n",
+            "id,Recipients\n1,ACME GmbH\n2,Öster AB\n",
+            "Recipient(s)\nACME GmbH\nÖster AB\n",
         ] {
             assert_eq!(
                 parse(text.as_bytes()),
@@ -133,6 +191,7 @@ mod tests {
             );
         }
         assert_eq!(parse(b"\"ACME, Inc.\"\n").0, ["ACME, Inc."]);
+        assert_eq!(parse(b"recipient\nCustomers\n").0, ["Customers"], "the remedy of the refusal");
     }
 
     #[test]
@@ -156,6 +215,12 @@ mod tests {
             (b"recipient\n", "has a header and no recipient"),
             (b"A\nACME, Inc.\n", "2 columns in line 2 and no header \"recipient\""),
             (b"name,id\nA,1\n", "2 columns in line 1"),
+            (
+                b"\nCustomers\nA\n",
+                "begins with \"Customers\" in line 2, which may be a header or a recipient",
+            ),
+            (b"Companies\nA\n", "head the column \"recipient\", in place of that line or above it"),
+            (b"recipient,Recipients\nA,B\n", "two columns headed \"recipient\" in line 1"),
             (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
             (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
             (b"A\n\"B\nC\n", "control character in the recipient of line 2"),

@@ -26,6 +26,8 @@ pub struct Layer {
     pub name: String,
     /// The column of its geometries.
     pub column: String,
+    /// Whether it has a spatial index.
+    pub has_index: bool,
     /// The features that have a geometry, ascending.
     pub fids: Vec<i64>,
     /// The vertex of every coordinate, feature by feature.
@@ -78,7 +80,8 @@ impl Layer {
         }
         fids.shrink_to_fit();
         vertices.shrink_to_fit();
-        Ok(Layer { name, column, fids, vertices })
+        let has_index = connection.table_exists(None, format!("rtree_{name}_{column}").as_str())?;
+        Ok(Layer { name, column, has_index, fids, vertices })
     }
 
     /// Where its coordinates go, feature by feature, when the vertices go `to` these places.

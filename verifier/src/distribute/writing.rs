@@ -1,6 +1,6 @@
 //! A copy: written, read back, published.
 
-use super::{Job, copies::Copy, moving, ogr2ogr};
+use super::{Job, copies::Copy, moving};
 use crate::{
     Error, Result,
     reading::{forget_failure, last_failure},
@@ -22,15 +22,15 @@ pub fn write(job: &Job, copy: &Copy, moved: &[[f64; 2]], distortion: Distortion)
     let workplace = Workplace::new(job.folder)?;
     let folder = workplace.subfolder("out")?;
     let file = folder.join(copy.file.file_name().expect("a copy has a name"));
-    if job.format.driver == "GPKG" {
-        moving::write(job.staged, &file, moved)?;
-    } else {
-        let marked = workplace.folder().join("marked.gpkg");
-        moving::write(job.staged, &marked, moved)?;
-        let warnings = ogr2ogr::copy(job.format.driver, &marked, &file, &[])?;
-        job.warnings.lock().expect("nobody panics with them").extend(warnings);
+    let (staged, moves) = (&job.stage.staged, Moves { from: job.vertices, to: moved });
+    match &job.stage.plain {
+        None => moving::write(staged, &file, moved)?,
+        Some(plain) => {
+            let warnings = plain.write(staged, workplace.folder(), &file, moves)?;
+            job.warnings.lock().expect("nobody panics with them").extend(warnings);
+        }
     }
-    check(job, &file, Moves { from: job.vertices, to: moved })?;
+    check(job, &file, moves)?;
     let reference = job.reference.clone();
     let record = marking::record(job.options, &copy.subject(), job.key, reference, distortion);
     publish(copy, &workplace, &folder, &record.to_json(), job.format)
@@ -39,11 +39,10 @@ pub fn write(job: &Job, copy: &Copy, moved: &[[f64; 2]], distortion: Distortion)
 /// Fails unless the file holds the features of the staged map, moved, within the precision of its format.
 fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
     let driver = job.format.driver;
-    let (staged, file) = (open(&job.staged.path, "GPKG")?, open(path, driver)?);
+    let (staged, file) = (open(&job.stage.staged.path, "GPKG")?, open(path, driver)?);
     for number in 0..staged.layer_count() {
         let (meant, in_file) = (staged.layer(number), file.layer(number));
-        let layer = meant.as_ref().map_or_else(|_| number.to_string(), LayerAccess::name);
-        let moving = job.staged.layer(&layer);
+        let moving = meant.as_ref().ok().and_then(|layer| job.stage.staged.layer(&layer.name()));
         forget_failure();
         let comparison = Comparison {
             digits: job.format.digits(&[]),
@@ -57,7 +56,10 @@ fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
             }
             (_, in_file) => comparison.layers(meant, in_file, None),
         };
-        compared.map_err(|difference| MapError::NotKept { driver, layer, difference })?;
+        compared.map_err(|difference| {
+            let layer = job.stage.layers.get(number).cloned().unwrap_or_default();
+            MapError::NotKept { driver, layer, difference }
+        })?;
     }
     Ok(())
 }

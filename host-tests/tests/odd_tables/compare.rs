@@ -1,0 +1,132 @@
+//! What differs between the file of plain `ogr2ogr` and a marked one, but for coordinates that moved a little.
+
+use meshmark_host_tests::{
+    contents::{self, LayerContents},
+    plugin::Host,
+};
+use std::{fs, path::Path};
+
+/// Metres on the ground.
+const TOLERANCE_M: f64 = 0.75;
+/// Metres of a degree of latitude, the longer one.
+const METRES_PER_DEGREE: f64 = 111_700.0;
+
+/// What differs.
+pub fn files(host: &Host, format: &str, plain: &str, marked: &str) -> Option<String> {
+    let attributes = match format {
+        "ESRI Shapefile" => companions(&host.path(plain), &host.path(marked)),
+        "GeoJSON" | "GeoJSONSeq" => {
+            first_difference(&without_geometries(host, plain), &without_geometries(host, marked))
+        }
+        _ => first_difference(&dump(host, format, plain), &dump(host, format, marked)),
+    };
+    attributes.or_else(|| geometries(format, &host.path(plain), &host.path(marked)))
+}
+
+/// The files beside a Shapefile's geometries, byte by byte.
+fn companions(plain: &Path, marked: &Path) -> Option<String> {
+    let read = |path: &Path, ending: &str| fs::read(path.with_extension(ending)).ok();
+    let differs = |ending: &&&str| read(plain, ending) != read(marked, ending);
+    let ending = ["dbf", "cpg", "prj"].iter().find(differs)?;
+    Some(format!("the .{ending} differs"))
+}
+
+/// The text of a GeoJSON file, without what comes after the last `"geometry":` of a line.
+fn without_geometries(host: &Host, file: &str) -> Vec<String> {
+    let bytes = fs::read(host.path(file)).unwrap();
+    let cut = |line: &str| line.rsplit_once("\"geometry\":").map_or(line, |(start, _)| start).to_string();
+    String::from_utf8_lossy(&bytes).lines().map(cut).collect()
+}
+
+/// What `ogrinfo` says of a file and its features; FlatGeobuf orders and numbers them by place.
+fn dump(host: &Host, format: &str, file: &str) -> Vec<String> {
+    let run = host.run("ogrinfo", &["-al", "-geom=NO", file]);
+    let is_ours = |line: &&str| {
+        !["INFO: ", "Extent: ", "      using driver"].iter().any(|start| line.starts_with(start))
+    };
+    let text = run.stdout.lines().filter(is_ours).collect::<Vec<_>>().join("\n");
+    if format != "FlatGeobuf" {
+        return text.lines().map(String::from).collect();
+    }
+    let mut parts: Vec<String> = text.split("OGRFeature(").map(String::from).collect();
+    for feature in &mut parts[1..] {
+        *feature = feature.split_once('\n').map_or(String::new(), |(_, values)| values.trim().to_string());
+    }
+    parts[1..].sort();
+    parts
+}
+
+fn first_difference(plain: &[String], marked: &[String]) -> Option<String> {
+    if plain == marked {
+        return None;
+    }
+    let pair = plain.iter().zip(marked).find(|(a, b)| a != b);
+    Some(match pair {
+        Some((a, b)) => format!("{:?} is {:?}", cut(a), cut(b)),
+        None => format!("{} lines are {}", plain.len(), marked.len()),
+    })
+}
+
+fn cut(text: &str) -> String {
+    text.chars().take(300).collect()
+}
+
+/// Values bit by bit, as far as the crate `gdal` reads them, and places.
+fn geometries(format: &str, plain: &Path, marked: &Path) -> Option<String> {
+    let [before, after] = [plain, marked].map(|path| layers(format, path));
+    if before.len() != after.len() {
+        return Some(format!("{} layers are {}", before.len(), after.len()));
+    }
+    for (before, after) in before.iter().zip(&after) {
+        if before.features.len() != after.features.len() {
+            return Some(format!("{} features are {}", before.features.len(), after.features.len()));
+        }
+        for (a, b) in before.features.iter().zip(&after.features) {
+            if (a.fid, &a.attributes) != (b.fid, &b.attributes) {
+                return Some(format!(
+                    "{:?} {} is {:?} {}",
+                    a.fid,
+                    cut(&a.attributes),
+                    b.fid,
+                    cut(&b.attributes)
+                ));
+            }
+            let [from, to] = [a, b].map(|feature| {
+                feature
+                    .geometries
+                    .iter()
+                    .map(|geometry| geometry.as_deref().map(contents::coords))
+                    .collect::<Vec<_>>()
+            });
+            if !is_near(&from, &to) {
+                return Some(format!("feature {:?}: {from:?} is at {to:?}", a.fid));
+            }
+        }
+    }
+    let coords = |layers: &[LayerContents]| layers.iter().flat_map(LayerContents::coords).collect::<Vec<_>>();
+    (coords(&before) == coords(&after)).then(|| "nothing is marked".into())
+}
+
+/// Whether the same geometries are null, and every coordinate is near where it was.
+fn is_near(from: &[Option<Vec<[f64; 2]>>], to: &[Option<Vec<[f64; 2]>>]) -> bool {
+    let near = |a: &[f64; 2], b: &[f64; 2]| {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() * METRES_PER_DEGREE <= 2.0 * TOLERANCE_M)
+    };
+    from.len() == to.len()
+        && from.iter().zip(to).all(|pair| match pair {
+            (None, None) => true,
+            (Some(from), Some(to)) => from.len() == to.len() && from.iter().zip(to).all(|(a, b)| near(a, b)),
+            _ => false,
+        })
+}
+
+fn layers(format: &str, path: &Path) -> Vec<LayerContents> {
+    let mut layers = contents::read(path);
+    if format == "FlatGeobuf" {
+        for layer in &mut layers {
+            layer.features.iter_mut().for_each(|feature| feature.fid = None);
+            layer.features.sort_by(|a, b| a.attributes.cmp(&b.attributes));
+        }
+    }
+    layers
+}

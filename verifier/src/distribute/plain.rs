@@ -1,0 +1,86 @@
+//! The unmarked map as plain `ogr2ogr` writes it in the format of the copies. A copy is that, but for the coordinates: so
+//! names, values and ids of fields never pass through a GeoPackage, which cannot hold all of them.
+
+use super::{flatgeobuf, geojson, moving, ogr2ogr, staged::Staged};
+use crate::{Error, Result};
+use meshmark_dataset::{formats::Format, marking::Moves, workplace::file_error};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// The files of a Shapefile that hold geometries; the others are those of the plain copy.
+const GEOMETRY_FILES: [&str; 2] = ["shp", "shx"];
+
+/// The plain copy.
+pub struct Plain {
+    path: PathBuf,
+    driver: &'static str,
+}
+
+impl Plain {
+    /// Copies the map into an empty folder; `warn` hears what `ogr2ogr` warns of.
+    pub fn new(
+        map: &Path,
+        folder: &Path,
+        format: &'static Format,
+        warn: &mut dyn FnMut(&str),
+    ) -> Result<Self> {
+        let path = folder.join("map").with_extension(&format.ending()[1..]);
+        ogr2ogr::copy(format.driver, map, &path, &[])?.iter().for_each(|text| warn(text));
+        Ok(Plain { path, driver: format.driver })
+    }
+
+    /// Writes a copy with the vertices elsewhere; `work` is a folder for what is only needed meanwhile. What `ogr2ogr`
+    /// warned of.
+    pub fn write(&self, staged: &Staged, work: &Path, file: &Path, moves: Moves) -> Result<Vec<String>> {
+        if self.driver == "FlatGeobuf" {
+            flatgeobuf::write(&self.path, file, moves)?;
+            return Ok(Vec::new());
+        }
+        let marked = work.join("marked.gpkg");
+        moving::write(staged, &marked, moves.to)?;
+        let (part, is_json) = (work.join("geometries"), self.driver != "ESRI Shapefile");
+        let part = part.with_extension(self.path.extension().expect("it was given one"));
+        let warnings = ogr2ogr::copy(self.driver, &marked, &part, &[])?;
+        match is_json {
+            true => geojson::write(&self.path, &part, file)?,
+            false => self.write_shapefile(&part, file)?,
+        }
+        Ok(warnings)
+    }
+
+    fn write_shapefile(&self, geometries: &Path, file: &Path) -> Result<()> {
+        let size = |path: &Path| {
+            let path = path.with_extension("shx");
+            path.metadata()
+                .map(|metadata| metadata.len())
+                .map_err(|error| file_error("reading", &path, error))
+        };
+        if size(&self.path)? != size(geometries)? {
+            return Err(changed());
+        }
+        let folder = self.path.parent().expect("it is in a folder");
+        let entries = fs::read_dir(folder).map_err(|error| file_error("reading", folder, error))?;
+        for entry in entries.flatten() {
+            let path = entry.path();
+            let extension = path.extension().unwrap_or_default();
+            let from = match GEOMETRY_FILES.iter().any(|name| extension == *name) {
+                true => geometries.with_extension(extension),
+                false => path.clone(),
+            };
+            let to = file.with_extension(extension);
+            fs::copy(&from, &to).map_err(|error| file_error("writing", &to, error))?;
+        }
+        Ok(())
+    }
+}
+
+/// The plain copy and the geometries do not belong together.
+pub fn changed() -> Error {
+    Error::Unreadable(
+        "the map was changed while it was read, or ogr2ogr reads other features of it: convert it to a GeoPackage, and \
+         distribute that"
+            .into(),
+    )
+}

@@ -1,0 +1,100 @@
+//! What all copies are made of: the map as `ogr2ogr` copies it, and a GeoPackage whose geometries move.
+
+use super::{
+    Request, ogr2ogr,
+    plain::{Plain, changed},
+    reading,
+    staged::Staged,
+};
+use crate::{Error, Result};
+use gdal::{
+    Dataset, DriverManager,
+    vector::{Feature, Layer, LayerAccess, LayerOptions},
+};
+use meshmark_core::options::Spelling;
+use meshmark_dataset::{Error as MapError, Survey, formats::Format, parse_srs, workplace::Workplace};
+use std::path::Path;
+
+/// What all copies are made of.
+pub struct Stage {
+    /// The unmarked map: all of it where copies are GeoPackages, else its geometries.
+    pub staged: Staged,
+    /// All else of the map, unless copies are GeoPackages.
+    pub plain: Option<Plain>,
+    /// The names of the map's layers.
+    pub layers: Vec<String>,
+}
+
+impl Stage {
+    /// Copies the map; `warn` hears what `ogr2ogr` warns of.
+    pub fn new(
+        request: &Request,
+        format: &'static Format,
+        (dataset, map): (&Dataset, &Survey),
+        workplace: &Workplace,
+        warn: &mut dyn FnMut(&str),
+    ) -> Result<Self> {
+        let layers: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
+        check_fits(request, format, map, &layers)?;
+        let path = workplace.folder().join("staged.gpkg");
+        let marks = |name: &str| {
+            let chosen = request.options.layers.as_ref();
+            chosen.is_none_or(|chosen| chosen.iter().any(|layer| layer == name))
+        };
+        let (staged, plain) = if format.driver == "GPKG" {
+            let options = ["-lco", "SPATIAL_INDEX=YES"];
+            ogr2ogr::copy("GPKG", &request.map, &path, &options)?.iter().for_each(|text| warn(text));
+            (Staged::read(path, &map.vertices, marks)?, None)
+        } else {
+            let plain = Plain::new(&request.map, &workplace.subfolder("plain")?, format, warn)?;
+            let failed = |error| reading::failed("map", &request.map, error);
+            copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path)
+                .map_err(|error| Error::Usage(format!("writing {} failed: {error}", path.display())))?;
+            (Staged::read(path, &map.vertices, |_| true)?, Some(plain))
+        };
+        let geometries = map.geometries.as_ref().expect("the map was read with them");
+        let staged_geometries: usize = staged.layers.iter().map(|layer| layer.fids.len()).sum();
+        match staged_geometries == geometries.len() {
+            true => Ok(Stage { staged, plain, layers }),
+            false => Err(changed()),
+        }
+    }
+}
+
+/// Refuses what the format would hold otherwise.
+fn check_fits(request: &Request, format: &'static Format, map: &Survey, layers: &[String]) -> Result<()> {
+    let driver = format.driver;
+    let refused = |error: MapError| {
+        Err(Error::Usage(format!("the map {}: {}", request.map.display(), error.text(Spelling::Flag))))
+    };
+    if layers.len() > 1 && !format.many_layers {
+        return refused(MapError::OneLayer { driver });
+    }
+    let is_wgs84 =
+        map.crs.as_ref().is_none_or(|crs| parse_srs("EPSG:4326").is_ok_and(|wgs84| crs.is_same(&wgs84)));
+    match layers.first() {
+        Some(layer) if format.is_wgs84_only(&[]) && !is_wgs84 => {
+            refused(MapError::NotWgs84 { driver, layer: layer.clone() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The geometries of a layer, in its order, as a GeoPackage.
+fn copy_geometries(mut layer: Layer, path: &Path) -> gdal::errors::Result<()> {
+    let mut staged = DriverManager::get_driver_by_name("GPKG")?.create_vector_only(path)?;
+    let (srs, ty) = (layer.spatial_ref(), layer.defn().geometry_type());
+    let options = Some(&["SPATIAL_INDEX=NO"][..]);
+    let mut transaction = staged.start_transaction()?;
+    let to = transaction.create_layer(LayerOptions { name: "map", srs: srs.as_ref(), ty, options })?;
+    layer.reset_feature_reading(); // it was read to its end before
+    for feature in layer.features() {
+        let mut copy = Feature::new(to.defn())?;
+        if let Ok(geometry) = feature.geometry_by_index(0) {
+            copy.set_geometry(geometry.clone())?;
+        }
+        copy.create(&to)?;
+    }
+    transaction.commit()?;
+    staged.close()
+}
