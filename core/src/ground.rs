@@ -43,6 +43,19 @@ impl Ground {
         }
     }
 
+    /// Where a point of the ellipsoid is in space, metres from its centre (geocentric coordinates, EPSG method 9602);
+    /// `None` in a plane. Unlike degrees, these do not jump at the 180th meridian or turn about the poles.
+    pub fn in_space(&self, point: [f64; 2]) -> Option<[f64; 3]> {
+        let Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } = *self else {
+            return None;
+        };
+        let [(sin_lon, cos_lon), (sin_lat, cos_lat)] =
+            point.map(|degrees| (degrees * radians_per_unit).sin_cos());
+        let e2 = 1.0 - (b / a).powi(2);
+        let normal = a / (1.0 - e2 * sin_lat * sin_lat).sqrt();
+        Some([normal * cos_lat * cos_lon, normal * cos_lat * sin_lon, normal * (1.0 - e2) * sin_lat])
+    }
+
     /// The vector from `a` to `b` (CRS units) in metres, measured at `a`.
     pub fn metres_between(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let [mx, my] = self.metres_per_unit(a);
@@ -84,6 +97,20 @@ mod tests {
         let [x90, y90] = Ground::WGS84.metres_per_unit([10.0, 90.0]);
         assert!((x0 - 111_319.49).abs() < 0.01 && (y0 - 110_574.28).abs() < 0.01);
         assert!(x90 < 1e-6 && (y90 - 111_693.98).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_small_step_has_one_length_in_space_and_on_the_ground() {
+        for place in [[25.0, 60.0], [-100.0, -35.0], [10.0, 0.0]] {
+            let [mx, my] = Ground::WGS84.metres_per_unit(place);
+            let there =
+                |dx: f64, dy: f64| Ground::WGS84.in_space([place[0] + dx / mx, place[1] + dy / my]).unwrap();
+            for (dx, dy) in [(1.0, 0.0), (0.0, 1.0)] {
+                let (from, to) = (there(-dx, -dy), there(dx, dy));
+                let length = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt();
+                assert!((length - 2.0).abs() < 1e-6, "{place:?} {length}");
+            }
+        }
     }
 
     #[test]

@@ -18,9 +18,9 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// From the metres east and north that a unit along x and a unit along y are.
-    pub fn new(along_x: [f64; 2], along_y: [f64; 2]) -> Self {
-        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+    /// From what a unit along x and a unit along y are on the ground: vectors in metres, in any three perpendicular axes.
+    pub fn new(along_x: [f64; 3], along_y: [f64; 3]) -> Self {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (xx, xy, yy) = (dot(along_x, along_x), dot(along_x, along_y), dot(along_y, along_y));
         // The singular values: the square roots of the eigenvalues of the metric.
         let (mean, half) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
@@ -152,7 +152,7 @@ mod tests {
     /// That of the Mercator projection of a sphere.
     fn mercator([_, y]: [f64; 2]) -> Scale {
         let metres = 1.0 / (y / RADIUS_M).cosh();
-        Scale::new([metres, 0.0], [0.0, metres])
+        Scale::new([metres, 0.0, 0.0], [0.0, metres, 0.0])
     }
 
     fn lattice(vertices: &VertexTable, one: f64) -> Option<ScaleLattice> {
@@ -179,9 +179,9 @@ mod tests {
 
     #[test]
     fn a_unit_of_two_lengths_is_off_in_its_worst_direction() {
-        let plate_carree = Scale::new([0.5, 0.0], [0.0, 1.0]);
+        let plate_carree = Scale::new([0.5, 0.0, 0.0], [0.0, 1.0, 0.0]);
         assert_eq!(plate_carree.extremes, [0.5, 1.0]);
-        let turned = Scale::new([0.6, 0.8], [-0.4, 0.3]);
+        let turned = Scale::new([0.6, 0.8, 0.0], [-0.4, 0.3, 0.0]);
         assert!((turned.extremes[0] - 0.5).abs() < 1e-12 && (turned.extremes[1] - 1.0).abs() < 1e-12);
         assert!((plate_carree.off(0.5f64.sqrt()) - 0.414).abs() < 1e-3);
     }
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn places_that_the_projection_has_not_leave_the_scale_to_the_others() {
         let vertices = VertexTable::new(vec![[0.0, 0.0], [10.0, 10.0]]).unwrap();
-        let half = |p: &[f64; 2]| (p[0] < 5.1).then(|| Scale::new([2.0, 0.0], [0.0, 2.0]));
+        let half = |p: &[f64; 2]| (p[0] < 5.1).then(|| Scale::new([2.0, 0.0, 0.0], [0.0, 2.0, 0.0]));
         let lattice =
             ScaleLattice::measure(&vertices, 2.0, 1e-3, |at| at.iter().map(half).collect()).unwrap();
         assert_eq!(lattice.at([1.0, 1.0]).unwrap().metres_per_unit, [2.0, 2.0]);

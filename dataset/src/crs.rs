@@ -95,10 +95,14 @@ impl CoordinateSystem {
         })
     }
 
-    /// Metres per unit at a place: the square root of the areal scale. An EPSG:3857 unit is half a metre at Helsinki.
+    /// Metres per unit at a place: the square root of the areal scale, by differences of 100 units of
+    /// length in longitude and latitude. An EPSG:3857 unit is half a metre at Helsinki.
     fn measured_metres_per_unit(&self, place: [f64; 2]) -> Option<f64> {
         let local = Local::new(self)?;
-        let [along_x, along_y] = local.differences(&[place]).pop()??;
+        let [lon, lat] = local.around(&[place]);
+        let [m_lon, m_lat] = local.ellipsoid.metres_per_unit([lon[4], lat[4]]);
+        let side = |a: usize, b: usize| [(lon[b] - lon[a]) * m_lon, (lat[b] - lat[a]) * m_lat];
+        let (along_x, along_y) = (side(0, 1), side(2, 3));
         let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
         let measured = area.sqrt() / (2.0 * local.step);
         (measured.is_finite() && measured > 0.0).then_some(measured)
@@ -108,7 +112,7 @@ impl CoordinateSystem {
 /// A scale that is wrong by a smaller share is right.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// The scales of a projected CRS, by differences of 100 metres in longitude and latitude.
+/// The scales of a projected CRS, by differences of 100 metres.
 struct Local {
     to_geographic: CoordTransform,
     ellipsoid: Ground,
@@ -127,32 +131,36 @@ impl Local {
         Some(Local { to_geographic, ellipsoid, step: 50.0 / crs.0.linear_units() })
     }
 
-    /// The metres east and north that two steps along x and two along y are at each of these places.
-    fn differences(&self, places: &[[f64; 2]]) -> Vec<Option<[[f64; 2]; 2]>> {
-        const POINTS: usize = 5;
+    /// Longitudes and latitudes left and right of each place, below and above it, and of itself; not finite where the
+    /// projection has no such place.
+    fn around(&self, places: &[[f64; 2]]) -> [Vec<f64>; 2] {
         let s = self.step;
         let around =
             places.iter().flat_map(|[x, y]| [[x - s, *y], [x + s, *y], [*x, y - s], [*x, y + s], [*x, *y]]);
         let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = around.map(|[x, y]| (x, y)).unzip();
         // An error is of some points only; those are not finite then.
         let _ = self.to_geographic.transform_coords(&mut lon, &mut lat, &mut []);
-        let difference = |(lon, lat): (&[f64], &[f64])| {
-            let [m_lon, m_lat] = self.ellipsoid.metres_per_unit([lon[4], lat[4]]);
-            let side = |a: usize, b: usize| [(lon[b] - lon[a]) * m_lon, (lat[b] - lat[a]) * m_lat];
-            let sides = [side(0, 1), side(2, 3)];
-            sides.as_flattened().iter().all(|metres| metres.is_finite()).then_some(sides)
-        };
-        lon.chunks(POINTS).zip(lat.chunks(POINTS)).map(difference).collect()
+        [lon, lat]
     }
 
     fn scales(&self, places: &[[f64; 2]]) -> Vec<Option<Scale>> {
-        let scale = |sides: Option<[[f64; 2]; 2]>| {
-            let [along_x, along_y] = sides?.map(|side| side.map(|metres| metres / (2.0 * self.step)));
-            Some(Scale::new(along_x, along_y)).filter(|scale| scale.extremes[0] > 0.0)
+        let [lon, lat] = self.around(places);
+        let scale = |(lon, lat): (&[f64], &[f64])| {
+            let in_space = |i: usize| self.ellipsoid.in_space([lon[i], lat[i]]);
+            let unit = |a: usize, b: usize| {
+                let (from, to) = (in_space(a)?, in_space(b)?);
+                Some([0, 1, 2].map(|axis| (to[axis] - from[axis]) / (2.0 * self.step)))
+            };
+            let scale = Scale::new(unit(0, 1)?, unit(2, 3)?);
+            let [least, largest] = scale.extremes;
+            (least > 0.0 && largest.is_finite()).then_some(scale)
         };
-        self.differences(places).into_iter().map(scale).collect()
+        lon.chunks(POINTS).zip(lat.chunks(POINTS)).map(scale).collect()
     }
 }
+
+/// Points around a place, itself included.
+const POINTS: usize = 5;
 
 /// A CRS from a user's text: EPSG:…, WKT, PROJ.
 ///
