@@ -10,6 +10,7 @@ mod text;
 use crate::{Error, Result, reading};
 use detail::{Detail, Findings};
 use meshmark_core::{
+    counted,
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
     map::Map,
     scale::Measure,
@@ -106,8 +107,9 @@ pub fn compare(
     if before.len() != after.len() {
         let (b, a) = (before.len(), after.len());
         return Err(Error::Usage(format!(
-            "the reference has {b} geometries and the marked map {a}: compare a map with the copy that was marked \
-             from it, before anything is removed"
+            "the reference has {} and the marked map {a}: compare a map with the copy that was marked \
+             from it, before anything is removed",
+            counted(b, "geometry")
         )));
     }
     // The reference was surveyed, the other map was not: it may be as far away as numbers go.
