@@ -15,4 +15,4 @@ for sheet in "$sheets"/*.gpkg; do
     ogr2ogr -f MESHMARK "MESHMARK:$folder/$name.gpkg" "$sheet" -dsco KEY="$key" -dsco RECIPIENT="$recipient" \
         -dsco REFERENCE="$folder/$name.reference.gpkg" -dsco RECORD="$folder/$name.json" || failed=$((failed + 1))
 done
-[ "$failed" -eq 0 ] || { echo "$failed sheets were not marked" >&2; exit 1; }
+[ "$failed" -eq 0 ] || { echo "sheets that were not marked: $failed" >&2; exit 1; }

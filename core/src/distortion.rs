@@ -107,7 +107,7 @@ impl Displacement {
     }
 }
 
-/// How much angles between segments changed.
+/// How much the angles at the corners of a map changed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AngleChange {
@@ -124,48 +124,62 @@ pub struct AngleChange {
 }
 
 impl AngleChange {
-    /// Of angles before and after, degrees from 0 to 360.
-    pub fn of(angles: &[[f64; 2]]) -> Self {
-        let change = |angle: &[f64; 2]| angle_change_deg(*angle);
+    /// Of the corners of a map.
+    pub fn at(corners: &[Corner]) -> Self {
         let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
-        let right: Vec<&[f64; 2]> = angles.iter().filter(|[before, _]| is_right(*before)).collect();
-        let kept = right.iter().filter(|angle| change(angle) <= RIGHT_DEG).count();
-        let spread = Spread::of(angles.iter().map(change).collect());
+        let right: Vec<&Corner> = corners.iter().filter(|corner| is_right(corner.before_deg)).collect();
+        let kept = right.iter().filter(|corner| corner.change_deg() <= RIGHT_DEG).count();
+        let spread = Spread::of(corners.iter().map(Corner::change_deg).collect());
         AngleChange {
-            count: angles.len(),
+            count: corners.len(),
             mean_change_deg: spread.mean,
             p99_change_deg: spread.p99,
             right_angles: right.len(),
             right_angles_kept: if right.is_empty() { 1.0 } else { kept as f64 / right.len() as f64 },
         }
     }
+}
 
-    /// Of the vertices of a map at which two segments meet and no more, from their places in it to those in `moved`.
-    pub fn at_corners(map: &Map, moved: &[[f64; 2]]) -> Self {
+/// A vertex of a map at which two segments meet and no more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// Where it is before marking, CRS units.
+    pub at: [f64; 2],
+    /// The angle between its segments, degrees from 0 to 360.
+    pub before_deg: f64,
+    /// The same angle after marking.
+    pub after_deg: f64,
+}
+
+impl Corner {
+    /// All of a map whose vertices are at `moved` after marking, but those with a segment that has no length.
+    pub fn all(map: &Map, moved: &[[f64; 2]]) -> Vec<Self> {
         let mut ends: Vec<[u32; 2]> = map.segments.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
         ends.par_sort_unstable();
-        let corners: Vec<&[[u32; 2]]> = ends.chunk_by(|a, b| a[0] == b[0]).filter(|c| c.len() == 2).collect();
-        let angles = |corner: &&[[u32; 2]]| {
-            let [from, at, to] = [corner[0][1], corner[0][0], corner[1][1]];
+        let pairs: Vec<&[[u32; 2]]> = ends.chunk_by(|a, b| a[0] == b[0]).filter(|c| c.len() == 2).collect();
+        let corner = |pair: &&[[u32; 2]]| {
+            let [from, at, to] = [pair[0][1], pair[0][0], pair[1][1]];
             let scale = map.measure().metres_per_unit(map.at(at));
             let angle = |coords: &[[f64; 2]]| {
                 let [from, at, to] = [from, at, to].map(|v| coords[v as usize]);
                 angle_deg(from, at, to, scale)
             };
-            Some([angle(map.vertices.coords())?, angle(moved)?])
+            let (before_deg, after_deg) = (angle(map.vertices.coords())?, angle(moved)?);
+            Some(Corner { at: map.at(at), before_deg, after_deg })
         };
-        Self::of(&corners.par_iter().filter_map(angles).collect::<Vec<_>>())
+        pairs.par_iter().filter_map(corner).collect()
     }
-}
 
-/// How far an angle turned, from 0 to 180.
-pub fn angle_change_deg([before, after]: [f64; 2]) -> f64 {
-    (after - before).abs().min(360.0 - (after - before).abs())
+    /// How far the angle turned, from 0 to 180.
+    pub fn change_deg(&self) -> f64 {
+        let turned = (self.after_deg - self.before_deg).abs();
+        turned.min(360.0 - turned)
+    }
 }
 
 /// The angle from the way back to the way on, turning left, degrees from 0 to 360; `scale` is metres per unit.
 /// `None` where either has no length.
-pub fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Option<f64> {
+fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Option<f64> {
     let direction = |p: [f64; 2]| {
         let [x, y] = [0, 1].map(|i| (p[i] - at[i]) * scale[i]);
         (x != 0.0 || y != 0.0).then(|| y.atan2(x))
@@ -186,12 +200,12 @@ mod tests {
         let segments = [[0, 1], [0, 2], [2, 3], [3, 4], [3, 5]];
         let ground = Ground::Plane { metres_per_unit: 1.0 };
         let map = Map { segments: &segments, ..Map::of_points(&vertices, ground) };
-        let still = AngleChange::at_corners(&map, &coords);
+        let still = AngleChange::at(&Corner::all(&map, &coords));
         assert_eq!((still.count, still.right_angles, still.right_angles_kept), (2, 2, 1.0));
         assert_eq!((still.mean_change_deg, still.p99_change_deg), (0.0, 0.0));
         let mut moved = coords;
         moved[1] = [4.0, 4.0]; // half of a right angle
-        let bent = AngleChange::at_corners(&map, &moved);
+        let bent = AngleChange::at(&Corner::all(&map, &moved));
         assert!((bent.mean_change_deg - 22.5).abs() < 1e-9 && bent.right_angles_kept == 0.5, "{bent:?}");
     }
 
@@ -203,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_full_turn_is_no_change() {
-        let change = AngleChange::of(&[[359.5, 0.5]]);
-        assert!((change.mean_change_deg - 1.0).abs() < 1e-9);
+        let corner = Corner { at: [0.0; 2], before_deg: 359.5, after_deg: 0.5 };
+        assert!((corner.change_deg() - 1.0).abs() < 1e-9);
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     carrier::{Carrier, bit_of_coefficient},
     deformation::{Deformation, Prediction},
     demodulation::joint_solved,
-    distortion::{AngleChange, Displacement},
+    distortion::{AngleChange, Corner, Displacement},
     key::SecretKey,
     map::Map,
     message::Message,
@@ -181,7 +181,7 @@ impl<'a> Embedding<'a> {
         self.check_message(message, &settled)?;
         Ok(Marked {
             displacement: Displacement::between(map.vertices, &settled.coords, &map.measure()),
-            angles: AngleChange::at_corners(map, &settled.coords),
+            angles: AngleChange::at(&Corner::all(map, &settled.coords)),
             coords: settled.coords,
             patches: patches.as_slice().len(),
             junctions: patches.constraints().junctions.hanging().len(),

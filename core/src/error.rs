@@ -1,5 +1,7 @@
 use crate::{
     code::Code,
+    counted,
+    key::RECIPIENT_BITS,
     options::{Kind, OPTIONS, PATCH_SIZE_RANGE, Spelling},
 };
 use std::fmt;
@@ -11,7 +13,7 @@ pub enum Error {
     NotFinite { index: usize, x: f64, y: f64 },
     TooWide { span: f64 },
     NoVertices,
-    TooFewVertices { vertices: usize, patch_size: usize },
+    TooFewVertices { vertices: usize, patch_size: usize, code: Code, chip_rate: usize },
     Collinear { vertices: usize },
     TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize },
     CodeLength { bits: usize },
@@ -55,7 +57,9 @@ impl Error {
                 format!("the coordinates span {span:e} units: more than the 1e30 a mesh can be built on")
             }
             Error::NoVertices => "the map has no vertices: give one with geometry".into(),
-            Error::TooFewVertices { vertices, patch_size } => too_few(*vertices, *patch_size, spelling),
+            Error::TooFewVertices { vertices, patch_size, code, chip_rate } => {
+                too_few(*vertices, *patch_size, *code, *chip_rate, spelling)
+            }
             Error::Collinear { vertices } => format!(
                 "all {vertices} distinct vertices lie on one straight line, so they have no mesh: mark a map whose \
                  vertices spread over an area"
@@ -123,22 +127,45 @@ impl Error {
     }
 }
 
-fn too_few(vertices: usize, patch_size: usize, spelling: Spelling) -> String {
+fn too_few(vertices: usize, patch_size: usize, code: Code, chip_rate: usize, spelling: Spelling) -> String {
     let least = PATCH_SIZE_RANGE.0;
     if vertices < least {
         return format!(
-            "the map has {vertices} distinct vertices, and needs at least {least} to carry a mark"
+            "the map has {}, and needs at least {least} to carry a mark",
+            counted(vertices, "distinct vertex")
         );
     }
-    format!(
-        "the map has {vertices} distinct vertices, fewer than {}: {} or less fits (the message must fit too: its bits, \
-         twice as many with {}, times {} must be fewer than {})",
-        spelling.value("PATCH_SIZE", patch_size),
-        spelling.value("PATCH_SIZE", vertices),
-        spelling.value("CODE", "LDPC"),
-        spelling.name("CHIP_RATE"),
-        spelling.name("PATCH_SIZE")
-    )
+    // One patch of all vertices has a coefficient less than vertices.
+    let room = vertices - 1;
+    let value = |option, value: usize| spelling.value(option, value);
+    let (size, repetition) = (value("PATCH_SIZE", vertices), spelling.value("CODE", "REPETITION"));
+    let rate = |code: Code| (room / (code.expansion() * RECIPIENT_BITS)).min(chip_rate);
+    let digits =
+        |rate: usize| format!("a message of at most {} hexadecimal digits fits", (room / rate / 4).min(256));
+    let needed = |code: Code| code.expansion() * RECIPIENT_BITS + 1;
+    let advice = match (code, rate(code), rate(Code::Repetition)) {
+        (Code::Ldpc, rate, _) if rate == chip_rate => format!("use {size}"),
+        (Code::Ldpc, 1.., _) => format!("use {size} and {}", value("CHIP_RATE", rate(code))),
+        (_, _, 0) => format!(
+            "a recipient needs {} vertices, {} with {repetition}: mark more layers together, or use {size}, {repetition} \
+             and {}, with which {}",
+            needed(Code::Ldpc),
+            needed(Code::Repetition),
+            value("CHIP_RATE", 1),
+            digits(1)
+        ),
+        (Code::Ldpc, _, rate) => format!(
+            "a recipient needs {} vertices but with {repetition}: mark more layers together, or use {size}, {repetition} \
+             and {}",
+            needed(code),
+            value("CHIP_RATE", rate)
+        ),
+        (Code::Repetition, _, rate) => {
+            format!("use {size} and {}, with which {}", value("CHIP_RATE", rate), digits(rate))
+        }
+    };
+    let wanted = spelling.value("PATCH_SIZE", patch_size);
+    format!("the map has {vertices} distinct vertices, fewer than {wanted}: {advice}")
 }
 
 fn too_many(code: Code, bits: usize, chip_rate: usize, vertices: usize, spelling: Spelling) -> String {

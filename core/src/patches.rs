@@ -89,7 +89,8 @@ impl Patches {
             return Err(Error::NoVertices);
         }
         if table.len() < patch_size {
-            return Err(Error::TooFewVertices { vertices: table.len(), patch_size });
+            let Parameters { code, chip_rate, .. } = *parameters;
+            return Err(Error::TooFewVertices { vertices: table.len(), patch_size, code, chip_rate });
         }
         let points = table.local(ground.x_scale(table.centre()[1]));
         let mesh = Mesh::delaunay(&points)?;
@@ -394,7 +395,7 @@ mod tests {
     fn too_few_vertices_name_the_size_that_fits() {
         let error = Patches::new(&Map::of_points(&scattered(300), METRES), &size(480)).unwrap_err();
         assert!(error.to_string().contains("300 distinct vertices"), "{error}");
-        assert!(error.to_string().contains("PATCH_SIZE=300 or less"), "{error}");
+        assert!(error.to_string().contains("use PATCH_SIZE=300"), "{error}");
     }
 
     #[test]

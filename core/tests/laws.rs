@@ -385,3 +385,34 @@ fn decoy_keys_score_like_a_standard_normal_on_a_marked_map() {
     assert!((0.7..1.3).contains(&spread), "{spread}");
     assert!(score(42) > 15.0, "{}", score(42));
 }
+
+/// The number behind the first `before` in a text.
+fn number_after(text: &str, before: &str) -> Option<usize> {
+    let digits = text.split_once(before)?.1;
+    digits.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+}
+
+#[test]
+fn what_a_map_with_too_few_vertices_is_advised_to_use_works() {
+    let scattered = |count: u64| (0..count).map(|i| [(i * 7919 % 1009) as f64, (i * 104_729 % 997) as f64]);
+    for count in [16, 17, 33, 68, 128, 129, 130, 256, 257, 300, 513, 600] {
+        let table = VertexTable::new(scattered(count).collect()).unwrap();
+        let map = Map::of_points(&table, METRES);
+        for (code, chip_rate) in
+            [(Code::Ldpc, 1), (Code::Ldpc, 3), (Code::Repetition, 2), (Code::Repetition, 9)]
+        {
+            let wanted = Parameters { code, chip_rate, patch_size: 4096, ..Parameters::default() };
+            let text = Patches::new(&map, &wanted).unwrap_err().to_string();
+            let advice = text.split_once("use ").unwrap().1;
+            let advised = Parameters {
+                code: if advice.contains("CODE=REPETITION") { Code::Repetition } else { code },
+                chip_rate: number_after(advice, "CHIP_RATE=").unwrap_or(chip_rate),
+                patch_size: number_after(advice, "PATCH_SIZE=").unwrap(),
+                ..wanted
+            };
+            let bits = number_after(advice, "at most ").map_or(128, |digits| 4 * digits);
+            let patches = Patches::new(&map, &advised).unwrap();
+            assert!(patches.carriers(bits, &advised).is_ok(), "{text}");
+        }
+    }
+}

@@ -122,7 +122,7 @@ fn an_unknown_layer_is_named_with_those_there_are() {
 
 #[test]
 fn a_map_that_is_too_small_is_told_which_patch_size_fits() {
-    let words = ["338 distinct vertices", "PATCH_SIZE=480", "PATCH_SIZE=338 or less fits"];
+    let words = ["338 distinct vertices", "PATCH_SIZE=480", "use PATCH_SIZE=338"];
     refuses_map(&Host::new(), &map(), &["-oo", "LAYERS=amenities"], &words);
 }
 

@@ -12,7 +12,7 @@ use crate::{
     verify::{Examination, Request, check_key, check_reference, examine, read_reference},
 };
 use meshmark_core::{
-    demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
+    counted, demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
 };
 use serde::Serialize;
 use std::path::Path;
@@ -54,9 +54,9 @@ impl Candidates {
     pub(crate) fn to_lines(&self) -> Vec<String> {
         let skipped = match self.skipped {
             0 => String::new(),
-            skipped => format!(", {skipped} files skipped"),
+            skipped => format!(", {} skipped", counted(skipped, "file")),
         };
-        let mut lines = vec![format!("candidates:   {} records tried{skipped}", self.tried)];
+        let mut lines = vec![format!("candidates:   {} tried{skipped}", counted(self.tried, "record"))];
         let line = |label: &str, entry: &Entry| {
             let p = entry.p_value_log10.map_or(String::new(), |p| format!(", p-value {}", power_of_ten(p)));
             format!("{label:<13} {}{p}", entry.name())

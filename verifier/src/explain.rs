@@ -5,6 +5,7 @@ use crate::{
     inputs::{Digested, Inputs},
     report::{Report, clipped, power_of_ten},
 };
+use meshmark_core::counted;
 use std::fmt::Write as _;
 
 impl Inputs {
@@ -36,13 +37,14 @@ impl Inputs {
         };
         let mut sentences = vec![
             format!(
-                "The suspect {} has {} distinct vertices in {suspect_crs}.",
-                self.suspect.path, v.suspect
+                "The suspect {} has {} in {suspect_crs}.",
+                self.suspect.path,
+                counted(v.suspect, "distinct vertex")
             ),
             format!(
-                "The reference {} has {} distinct vertices in {}.",
+                "The reference {} has {} in {}.",
                 self.reference.path,
-                v.reference,
+                counted(v.reference, "distinct vertex"),
                 p.crs.as_deref().unwrap_or("no CRS")
             ),
             format!("The key {} has the public id {}.", self.key.path, p.key_id),
@@ -162,9 +164,12 @@ pub(crate) fn probabilities(report: &Report) -> Vec<String> {
     }
     if let (Some(candidates), Some(p)) = (&report.candidates, report.p_value_log10) {
         sentences.push(format!(
-            "{} records were tried, so the larger of the probabilities for key and recipient counts {} times: {}.",
-            candidates.tried,
-            candidates.tried,
+            "{} tried, so the larger of the probabilities for key and recipient counts {}: {}.",
+            match candidates.tried {
+                1 => "1 record was".into(),
+                tried => format!("{tried} records were"),
+            },
+            counted(candidates.tried, "time"),
             power_of_ten(p)
         ));
     }

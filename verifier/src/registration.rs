@@ -11,7 +11,7 @@ use crate::{
     matching::Matcher,
     search::{Search, Way},
 };
-use meshmark_core::{ground::Ground, vertices::VertexTable};
+use meshmark_core::{counted, ground::Ground, vertices::VertexTable};
 use meshmark_dataset::{Label, Shape};
 use serde::Serialize;
 
@@ -80,7 +80,7 @@ impl Registration {
         let read_as = self.read_as.as_ref().map_or(String::new(), |read_as| format!(", read as {read_as}"));
         let landmarks = match self.landmarks {
             0 => String::new(),
-            count => format!(", {count} landmarks"),
+            count => format!(", {}", counted(count, "landmark")),
         };
         let polynomial = self.polynomial.map_or("", |_| ", then a cubic polynomial");
         let rms = self.rms_m.map_or(String::new(), |rms| format!(", residual {rms:.3} m RMS"));

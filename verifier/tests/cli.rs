@@ -86,6 +86,10 @@ fn make_records(folder: &Path, record: &str) {
     };
     fs::create_dir_all(folder.join("records")).unwrap();
     fs::create_dir_all(folder.join("no_records")).unwrap();
+    fs::create_dir_all(folder.join("one_record")).unwrap();
+    fs::write(folder.join("one_record/acme.json"), record).unwrap();
+    fs::write(folder.join("one_record/notes.txt"), "no record").unwrap();
+    fs::write(folder.join("one_record/no_record.json"), "[1]").unwrap();
     for (file, text) in [
         ("acme.json", record.to_string()),
         ("other.json", of("Another Ltd")),

@@ -2,7 +2,7 @@
 
 use meshmark_core::{
     code::Code,
-    distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
+    distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
     options::{Kind, Laplacian, OPTIONS, Shape},
     record::{Record, Reference, TopologyEntry},
 };
@@ -89,7 +89,10 @@ fn record() -> Record {
         srs: None,
         reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
         displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },
-        angles: AngleChange::of(&[[90.0, 91.0], [200.0, 190.0]]),
+        angles: AngleChange::at(&[
+            Corner { at: [0.0; 2], before_deg: 90.0, after_deg: 91.0 },
+            Corner { at: [0.0; 2], before_deg: 200.0, after_deg: 190.0 },
+        ]),
         areas: Areas { polygons: 1, mean_change: 0.01, p99_change: 0.01, max_change: 0.01 },
         hausdorff: Hausdorff { p99_m: 0.2, max_m: 0.3 },
         validity: Validity { invalid_before: 1, invalid_after: 1, newly_invalid: 0 },

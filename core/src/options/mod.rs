@@ -298,11 +298,11 @@ mod tests {
         assert!(
             flags(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).starts_with("both --recipient and --message")
         );
-        let few = Error::TooFewVertices { vertices: 300, patch_size: 480 };
-        assert!(few.text(Spelling::Flag).contains("fewer than --patch-size 480: --patch-size 300 or less"));
-        assert!(few.to_string().contains("fewer than PATCH_SIZE=480: PATCH_SIZE=300 or less"));
-        assert!(few.to_string().contains("twice as many with CODE=LDPC"));
-        let fewer = Error::TooFewVertices { vertices: 3, patch_size: 480 }.to_string();
+        let few = Error::TooFewVertices { vertices: 300, patch_size: 480, code: Code::Ldpc, chip_rate: 1 };
+        assert!(few.text(Spelling::Flag).contains("fewer than --patch-size 480: use --patch-size 300"));
+        assert!(few.to_string().contains("fewer than PATCH_SIZE=480: use PATCH_SIZE=300"));
+        let fewer = Error::TooFewVertices { vertices: 3, patch_size: 480, code: Code::Ldpc, chip_rate: 1 };
+        let fewer = fewer.to_string();
         assert!(fewer.contains("at least 16") && !fewer.contains("480"), "{fewer}");
     }
 

@@ -6,7 +6,7 @@ mod request;
 use crate::package_files;
 use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands, VerifyArgs};
 use clap::{CommandFactory, Parser};
-use meshmark_core::{key::SecretKey, options::Options};
+use meshmark_core::{counted, key::SecretKey, options::Options};
 use meshmark_verifier::{
     Error, ExitCode, Result,
     candidates::verify_candidates,
@@ -123,12 +123,11 @@ fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
         format: args.format,
     };
     let done = distribute::distribute(&request, &mut Progress::default(), &mut warn)?;
-    let copies = |count| if count == 1 { "1 copy".into() } else { format!("{count} copies") };
     let before = match done.finished_before {
         0 => String::new(),
-        count => format!(", {} there already", copies(count)),
+        count => format!(", {} there already", counted(count, "copy")),
     };
-    print(&format!("{} written to {}{before}\n", copies(done.written), request.folder.display()))?;
+    print(&format!("{} written to {}{before}\n", counted(done.written, "copy"), request.folder.display()))?;
     Ok(ExitCode::Match)
 }
 

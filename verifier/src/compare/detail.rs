@@ -6,7 +6,7 @@ use crate::{
     inputs::{Digested, digest},
     sketch::{ARROWS, BINS, Extent, Thinning, lines},
 };
-use meshmark_core::{distortion::angle_change_deg, scale::Measure, vertices::VertexTable};
+use meshmark_core::{distortion::Corner, scale::Measure, vertices::VertexTable};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
@@ -26,7 +26,7 @@ pub struct Detail {
     pub extent: Extent,
     /// How far vertices are from where they were, metres; null without vertices.
     pub displacement_m: Option<Histogram>,
-    /// How far angles turned, degrees; null without angles.
+    /// How far the angles at corners turned, degrees; null without corners.
     pub angle_change_deg: Option<Histogram>,
     /// Some of the vertices: x and y, CRS units, displacement in x and y, metres.
     pub moved: Vec<[f64; 4]>,
@@ -84,8 +84,7 @@ pub(super) struct Findings<'a> {
     pub moved: &'a [[f64; 2]],
     pub measure: &'a Measure<'a>,
     pub segments: &'a [[u32; 2]],
-    /// Places, and angles before and after.
-    pub corners: &'a [([f64; 2], [f64; 2])],
+    pub corners: &'a [Corner],
     /// Of torn vertices, new invalid geometries, new overlaps, changed crossings.
     pub places: [Vec<[f64; 2]>; 4],
 }
@@ -96,7 +95,7 @@ impl Findings<'_> {
         let pairs = coords.iter().zip(self.moved);
         let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.measure.metres_between(*a, *b)).collect();
         let lengths: Vec<f64> = displacements.iter().map(|[x, y]| x.hypot(*y)).collect();
-        let changes: Vec<f64> = self.corners.iter().map(|(_, angle)| angle_change_deg(*angle)).collect();
+        let changes: Vec<f64> = self.corners.iter().map(Corner::change_deg).collect();
         let mut arrows = Thinning::new(&extent, ARROWS);
         let shown = coords.iter().zip(&displacements).filter(|(at, _)| arrows.takes(**at));
         let grid = Thinning::new(&extent, CELLS);
@@ -110,7 +109,7 @@ impl Findings<'_> {
             displacement_m: Histogram::of(&lengths, BINS),
             angle_change_deg: Histogram::of(&changes, BINS),
             moved: shown.map(|(at, d)| [at[0], at[1], d[0], d[1]]).collect(),
-            angle_cells: cells(&grid, self.corners, &changes),
+            angle_cells: cells(&grid, self.corners),
             cell: grid.cell(),
             topology: Topology { torn, invalid, overlaps, crossings },
             lines: lines(&extent, coords, self.segments),
@@ -119,11 +118,11 @@ impl Findings<'_> {
 }
 
 /// The largest change of every cell that has a notable one.
-fn cells(grid: &Thinning, corners: &[([f64; 2], [f64; 2])], changes: &[f64]) -> Vec<[f64; 3]> {
+fn cells(grid: &Thinning, corners: &[Corner]) -> Vec<[f64; 3]> {
     let mut largest: BTreeMap<[u32; 2], f64> = BTreeMap::new();
-    for ((at, _), change) in corners.iter().zip(changes).filter(|(_, change)| **change >= NOTABLE_DEG) {
-        let cell = largest.entry(grid.cell_of(*at)).or_default();
-        *cell = cell.max(*change);
+    for corner in corners.iter().filter(|corner| corner.change_deg() >= NOTABLE_DEG) {
+        let cell = largest.entry(grid.cell_of(corner.at)).or_default();
+        *cell = cell.max(corner.change_deg());
     }
     let place = |(cell, change): (&[u32; 2], &f64)| {
         let [x, y] = grid.middle_of(*cell);

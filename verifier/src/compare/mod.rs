@@ -3,7 +3,6 @@
 //! Features correspond by their order within a layer, vertices by their order within a feature: the driver changes
 //! neither. Lengths, angles and areas are those on the ground.
 
-mod corners;
 mod crossings;
 pub mod detail;
 mod text;
@@ -11,7 +10,9 @@ mod text;
 use crate::{Error, Result, reading};
 use detail::{Detail, Findings};
 use meshmark_core::{
-    distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
+    counted,
+    distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
+    map::Map,
     scale::Measure,
     vertices::{VertexTable, WIDEST},
 };
@@ -33,7 +34,7 @@ pub struct Comparison {
     pub displacement: Displacement,
     /// How far features are from where they were, as sets of points.
     pub hausdorff: Hausdorff,
-    /// Angles between consecutive segments.
+    /// Angles at corners: vertices where two segments meet and no more.
     pub angles: AngleChange,
     /// Areas of polygons.
     pub areas: Areas,
@@ -106,8 +107,9 @@ pub fn compare(
     if before.len() != after.len() {
         let (b, a) = (before.len(), after.len());
         return Err(Error::Usage(format!(
-            "the reference has {b} geometries and the marked map {a}: compare a map with the copy that was marked \
-             from it, before anything is removed"
+            "the reference has {} and the marked map {a}: compare a map with the copy that was marked \
+             from it, before anything is removed",
+            counted(b, "geometry")
         )));
     }
     // The reference was surveyed, the other map was not: it may be as far away as numbers go.
@@ -162,8 +164,9 @@ impl Pairs<'_> {
         }
         let moved: Vec<[f64; 2]> = moved.into_iter().map(|to| to.expect("every vertex occurs")).collect();
         let segments = self.segments(&indices);
-        let corners = self.corners();
-        let angles: Vec<[f64; 2]> = corners.iter().map(|(_, angle)| *angle).collect();
+        let Measure { ground, lattice } = self.measure;
+        let map = Map { segments: &segments, lattice, ..Map::of_points(&vertices, ground) };
+        let corners = Corner::all(&map, &moved);
         let Quality { areas, hausdorff, validity, overlaps, newly_invalid, newly_overlapping } =
             self.quality();
         let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, &self.measure);
@@ -191,7 +194,7 @@ impl Pairs<'_> {
             },
             displacement: Displacement::between(&vertices, &moved, &self.measure),
             hausdorff,
-            angles: AngleChange::of(&angles),
+            angles: AngleChange::at(&corners),
             areas,
             validity,
             overlaps,
@@ -228,10 +231,5 @@ impl Pairs<'_> {
             grid: self.grid,
         }
         .quality()
-    }
-
-    /// Metres per unit at a geometry.
-    fn scale(&self, geometry: &Outline) -> [f64; 2] {
-        self.measure.metres_per_unit(geometry.first().unwrap_or_default())
     }
 }

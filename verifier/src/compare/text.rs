@@ -1,6 +1,7 @@
 //! A comparison for people, and as JSON.
 
 use super::Comparison;
+use meshmark_core::counted;
 
 impl Comparison {
     /// One JSON object.
@@ -26,15 +27,22 @@ impl Comparison {
             torn => format!(", {torn} of them torn apart"),
         };
         [
-            format!("compared:     {} features, {} vertices{torn}", compared.features, compared.vertices),
-            format!("displacement: {:.3} m RMS, 99 % up to {:.3} m, all up to {:.3} m", d.rms_m, d.p99_m, d.max_m),
+            format!(
+                "compared:     {}, {}{torn}",
+                counted(compared.features, "feature"),
+                counted(compared.vertices, "vertex")
+            ),
+            format!(
+                "displacement: {:.3} m RMS, 99 % up to {:.3} m, all up to {:.3} m",
+                d.rms_m, d.p99_m, d.max_m
+            ),
             format!("hausdorff:    99 % of features up to {:.3} m, all up to {:.3} m", h.p99_m, h.max_m),
             format!(
-                "angles:       change {:.2}° on average, 99 % up to {:.2}°; {:.1} % of {} right angles kept within 1°",
+                "angles:       change {:.2}° on average, 99 % up to {:.2}°; {:.1} % of {} kept within 1°",
                 angles.mean_change_deg,
                 angles.p99_change_deg,
                 100.0 * angles.right_angles_kept,
-                angles.right_angles
+                counted(angles.right_angles, "right angle")
             ),
             format!(
                 "areas:        change {:.3} % on average, 99 % up to {:.3} %, all up to {:.3} %",
@@ -47,16 +55,19 @@ impl Comparison {
                 validity.invalid_before, validity.invalid_after, validity.newly_invalid
             ),
             format!(
-                "overlaps:     {} pairs before, {} after, {} new ({:.6} m²), {} new slivers",
-                overlaps.before,
+                "overlaps:     {} before, {} after, {} new ({:.6} m²), {}",
+                counted(overlaps.before, "pair"),
                 overlaps.after,
                 overlaps.new,
                 overlaps.new_area_m2,
-                overlaps.new_slivers
+                counted(overlaps.new_slivers, "new sliver")
             ),
             format!(
-                "crossings:    {} pairs of segments before, {} after, {} new, {} lost",
-                crossings.before, crossings.after, crossings.new, crossings.lost
+                "crossings:    {} of segments before, {} after, {} new, {} lost",
+                counted(crossings.before, "pair"),
+                crossings.after,
+                crossings.new,
+                crossings.lost
             ),
         ]
         .join("\n")

@@ -179,7 +179,11 @@ fn run(
         written += in_parallel(threads.min(batch.len()), write_next).map_err(|(done, error)| {
             let (done, all) = (written + done, copies.len());
             error.with(&format!(
-                "; {done} of {all} copies were written, and the same command again makes the rest"
+                "; {done} of {} written, and the same command again makes the rest",
+                match all {
+                    1 => "1 copy was".into(),
+                    _ => format!("{all} copies were"),
+                }
             ))
         })?;
     }

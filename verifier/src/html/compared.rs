@@ -10,6 +10,7 @@ use crate::{
     report::{Report, clipped, printable},
 };
 use maud::{Markup, html};
+use meshmark_core::counted;
 
 pub fn compared(report: &Report) -> Markup {
     let content = html! {
@@ -68,14 +69,13 @@ pub fn settings(report: &Report) -> Markup {
     let p = &report.parameters;
     let text = |text: String| Some(html! { (text) });
     let chips = format!(
-        "{}, {} coefficient{} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
+        "{}, {} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
         if p.code == meshmark_core::code::Code::Ldpc {
             "as an error-correcting code word (LDPC)"
         } else {
             "repeated bits"
         },
-        p.chip_rate,
-        if p.chip_rate == 1 { "" } else { "s" },
+        counted(p.chip_rate, "coefficient"),
         p.patch_size,
         word(&p.basis)
     );
