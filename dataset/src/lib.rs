@@ -5,6 +5,7 @@
 
 mod assumption;
 mod crs;
+mod crs_wkt;
 pub mod decimals;
 mod error;
 mod features;

@@ -9,7 +9,7 @@ use gdal::{
 };
 use meshmark_host_tests::{
     contents::{self, lengths, moves},
-    plugin::Host,
+    plugin::{self, Host},
 };
 
 /// A map of one layer.
@@ -291,4 +291,32 @@ fn a_map_smaller_than_its_mark_is_refused() {
         let map = Map::new(srs, polygons(&at([0.0, 0.0], [1e-9, 1e-9])));
         refuses(&map, "lower TOLERANCE and AMPLITUDE");
     }
+}
+
+#[test]
+fn layers_whose_crs_differ_only_in_heights_are_marked_together() {
+    let host = Host::new();
+    let fixture = plugin::fixture("helsinki.gpkg").display().to_string();
+    for (layer, srs) in [("buildings", "EPSG:3067"), ("roads", "EPSG:3903"), ("landuse", "EPSG:3067+3900")] {
+        let more = ["-update", "map.gpkg", &fixture, layer, "-a_srs", srs, "-nlt", "CONVERT_TO_LINEAR"];
+        let skip = usize::from(!host.path("map.gpkg").exists());
+        host.run("ogr2ogr", &more[skip..]).succeeds();
+    }
+    host.mark("GPKG", "read.gpkg", "map.gpkg", &["-oo", "RECORD=read.json"]).succeeds();
+    let report = host.matches("map.gpkg", &["--record", "read.json", "read.gpkg"]);
+    assert_eq!(report["parameters"]["crs"], "EPSG:3067");
+    let (read, map) = (contents::read(&host.path("read.gpkg")), contents::read(&host.path("map.gpkg")));
+    let (_, longest) = lengths(&moves(&map, &read));
+    assert!(longest > 0.0 && longest < 0.76, "{longest}");
+    host.create("out.gpkg", "map.gpkg", &["-dsco", "SRS=EPSG:3067"]).succeeds();
+    assert!(contents::read(&host.path("out.gpkg")) == read);
+    host.run("ogr2ogr", &["-t_srs", "EPSG:3857", "moved.gpkg", "read.gpkg"]).succeeds();
+    host.matches("map.gpkg", &["--record", "read.json", "moved.gpkg"]);
+    // A CRS without a code that is another one is named in a few words.
+    let more = ["-update", "map.gpkg", &fixture, "amenities", "-t_srs", "EPSG:3857+3900"];
+    host.run("ogr2ogr", &more).succeeds();
+    let run = host.mark("GPKG", "mixed.gpkg", "map.gpkg", &[]);
+    let words =
+        "(EPSG:3067) and \"amenities\" (WGS 84 / Pseudo-Mercator + N2000 height) are not in the same CRS";
+    assert!(run.code == Some(1) && run.stderr.contains(words), "{}", run.stderr);
 }

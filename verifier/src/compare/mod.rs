@@ -124,7 +124,7 @@ pub fn compare(
     if let (Some(own), Some(other), true) = (own, other, away_m > MOST_AWAY_M)
         && !own.is_same(&other)
     {
-        let (marked, own, other) = (marked.display(), own.label(), other.label());
+        let (marked, [own, other]) = (marked.display(), own.names_apart(&other));
         return Err(Error::Usage(format!(
             "the marked map {marked} is in {other} and the reference in {own}: compare the copy that was marked, before it \
              is brought into another CRS"
