@@ -8,6 +8,7 @@ mod crs;
 mod crs_wkt;
 pub mod decimals;
 mod error;
+mod extent;
 mod features;
 mod file_id;
 pub mod formats;

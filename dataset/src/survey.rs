@@ -3,6 +3,7 @@
 use crate::{
     CoordinateSystem, Error, Geometries, Label, Result, Shape,
     crs::{self, reproject},
+    extent::Extent,
     labels, parse_srs, shapes,
     turns::turn,
     wkb::{self, Step},
@@ -316,7 +317,11 @@ impl Walk<'_> {
         for feature in layer.features() {
             features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
-                read_geometry(&feature, column, name, self.selection.geometries, chains)?;
+                let extent = match self.selection.target {
+                    Target::Own => Extent::of(columns[column].as_ref()),
+                    Target::Crs(_) | Target::Raw => Extent::ANY, // its CRS may be another than it says
+                };
+                read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
             }
             let vertices =
                 self.chains.coords.len() + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
@@ -408,7 +413,7 @@ fn read_geometry(
     feature: &Feature,
     column: usize,
     layer: &str,
-    keeps_geometries: bool,
+    (keeps_geometries, extent): (bool, Extent),
     chains: &mut Chains,
 ) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
@@ -419,12 +424,10 @@ fn read_geometry(
         chains.others.insert(chains.firsts.len() as u32, bytes.clone());
     }
     chains.begin_geometry();
-    let mut visit = |step, [x, y]: [f64; 2]| {
-        if !x.is_finite() || !y.is_finite() {
-            return Err(Error::NotFinite { layer: layer.into(), fid: fid(), x, y });
-        }
-        chains.push(step, [x, y]);
-        Ok([x, y])
+    let mut visit = |step, point: [f64; 2]| {
+        extent.check(point, layer, fid)?;
+        chains.push(step, point);
+        Ok(point)
     };
     match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
         visit(step, point).map_err(Visit::Ours)

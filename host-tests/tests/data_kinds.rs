@@ -320,3 +320,24 @@ fn layers_whose_crs_differ_only_in_heights_are_marked_together() {
         "(EPSG:3067) and \"amenities\" (WGS 84 / Pseudo-Mercator + N2000 height) are not in the same CRS";
     assert!(run.code == Some(1) && run.stderr.contains(words), "{}", run.stderr);
 }
+
+#[test]
+fn a_coordinate_further_away_than_any_place_is_found_by_layer_and_feature_in_every_way() {
+    let places = [("EPSG:3067", "1e308 2"), ("EPSG:3067", "3 -1e308"), ("EPSG:3067", "3 1e31")];
+    for (srs, bad) in places.into_iter().chain([("EPSG:3067", "1e20 4"), ("EPSG:4326", "25 1e20")]) {
+        let mut features: Vec<String> = (0..9).map(|i| format!("POINT ({i} {})", 50 + i * i % 7)).collect();
+        features[7] = format!("POINT ({bad})");
+        let map = Map::new(srs, features);
+        let words = "layer \"map\", feature 8: the coordinates (";
+        refuses(&map, words);
+        let host = Host::new();
+        map.write(&host);
+        std::fs::write(host.path("list.csv"), "recipient\nACME GmbH\n").unwrap();
+        let before = host.files();
+        let list = ["--key", "key.json", "--recipients", "list.csv", "--output-dir", "out", "map.gpkg"];
+        let run = host.run(host.meshmark().to_str().unwrap(), &[&["distribute"], &list[..]].concat());
+        assert!(run.code == Some(5) && run.stderr.contains(words), "{bad}: {}", run.stderr);
+        assert!(run.stderr.contains("further away than any place") && run.stderr.contains("leave it out"));
+        assert!(host.files() == before, "{bad}: {:?}", host.names());
+    }
+}

@@ -13,7 +13,7 @@ use detail::{Detail, Findings};
 use meshmark_core::{
     distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
     scale::Measure,
-    vertices::{VertexTable, WIDEST},
+    vertices::VertexTable,
 };
 use meshmark_dataset::{
     FeatureGeometry, Outline,
@@ -108,14 +108,6 @@ pub fn compare(
         return Err(Error::Usage(format!(
             "the reference has {b} geometries and the marked map {a}: compare a map with the copy that was marked \
              from it, before anything is removed"
-        )));
-    }
-    // The reference was surveyed, the other map was not: it may be as far away as numbers go.
-    let mut values = after.iter().flat_map(|feature| feature.outline.chains.iter().flatten().flatten());
-    if let Some(value) = values.find(|value| value.abs() > WIDEST) {
-        let marked = marked.display();
-        return Err(Error::Unreadable(format!(
-            "the marked map {marked} has a coordinate of {value:e}: no map is so wide"
         )));
     }
     let places = before.iter().zip(&after).find_map(|(a, b)| a.outline.first().zip(b.outline.first()));
