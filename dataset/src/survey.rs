@@ -13,7 +13,8 @@ use gdal::{
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{
-    disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice, vertices::VertexTable,
+    disjoint_sets::DisjointSets, ground::Ground, map::Map, options::join_list, scale::ScaleLattice,
+    vertices::VertexTable,
 };
 use std::collections::BTreeMap;
 
@@ -222,7 +223,7 @@ pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Res
         return Err(Error::NoLayers);
     }
     if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
-        return Err(Error::UnknownLayer { name: name.clone(), known: known.join(", ") });
+        return Err(Error::UnknownLayer { name: name.clone(), known: join_list(&known) });
     }
     let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
     Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())

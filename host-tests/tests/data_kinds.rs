@@ -341,3 +341,26 @@ fn a_coordinate_further_away_than_any_place_is_found_by_layer_and_feature_in_eve
         assert!(host.files() == before, "{bad}: {:?}", host.names());
     }
 }
+
+#[test]
+fn a_layer_with_a_comma_or_quotes_in_its_name_is_named_in_quotes() {
+    let host = Host::new();
+    host.copy("helsinki.gpkg", "plain.gpkg");
+    for (layer, name) in [("buildings", "a,b"), ("roads", "say \"c\"")] {
+        let more = ["-update", "map.gpkg", "plain.gpkg", layer, "-nln", name];
+        host.run("ogr2ogr", &more[usize::from(!host.path("map.gpkg").exists())..]).succeeds();
+    }
+    for (number, layers) in [r#""a,b""#, r#"say "c", "a,b""#, r#""say ""c""""#].iter().enumerate() {
+        let option = format!("LAYERS={layers}");
+        let (copy, record) = (format!("{number}.gpkg"), format!("{number}.json"));
+        let options = ["-oo", &option, "-oo", &format!("RECORD={record}")];
+        host.mark("GPKG", &copy, "map.gpkg", &options).succeeds();
+        host.matches("map.gpkg", &["--record", &record, &copy]);
+        host.matches("map.gpkg", &["--recipient", "ACME GmbH", "--layers", layers, &copy]);
+        let compare = ["compare", "--layers", layers, "map.gpkg", &copy];
+        host.run(host.meshmark().to_str().unwrap(), &compare).succeeds();
+    }
+    let run = host.mark("GPKG", "none.gpkg", "map.gpkg", &["-oo", "LAYERS=a,b"]);
+    let words = r#"the map has no layer "a": LAYERS may name "a,b", say "c""#;
+    assert!(run.code == Some(1) && run.stderr.contains(words), "{}", run.stderr);
+}
