@@ -364,3 +364,36 @@ fn a_layer_with_a_comma_or_quotes_in_its_name_is_named_in_quotes() {
     let words = r#"the map has no layer "a": LAYERS may name "a,b", say "c""#;
     assert!(run.code == Some(1) && run.stderr.contains(words), "{}", run.stderr);
 }
+
+#[test]
+fn a_csv_file_with_two_columns_of_coordinates_is_marked_and_verified_as_the_page_on_formats_says() {
+    let page = include_str!("../../docs/formats.md");
+    let block = |kind: &str| {
+        let (_, rest) = page.split_once(&format!("```{kind}\n")).expect("the page has it");
+        rest.split_once("```").expect("it ends").0
+    };
+    let host = Host::new();
+    let place = degrees(24.9, 60.1);
+    let row = |i: usize| {
+        let [lon, lat] = place([scattered(i) * 2000.0, scattered(i + 7777) * 2000.0]);
+        format!("p{i},{lon:.6},{lat:.6}\n")
+    };
+    let rows: String = (0..700).map(row).collect();
+    std::fs::write(host.path("points.csv"), format!("name,lon,lat\n{rows}")).unwrap();
+    std::fs::write(host.path("points.vrt"), block("xml")).unwrap();
+    host.mark("GPKG", "marked.gpkg", "points.vrt", &["-oo", "RECORD=acme.json"]).succeeds();
+    host.matches("points.vrt", &["--record", "acme.json", "marked.gpkg"]);
+    let fields =
+        host.run("ogrinfo", &["-so", "-q", "marked.gpkg", "-sql", "SELECT * FROM points"]).succeeds();
+    assert!(!fields.stdout.contains("lon") && !fields.stdout.contains("lat:"), "{}", fields.stdout);
+    let meshmark = host.meshmark();
+    host.run(meshmark.to_str().unwrap(), &["compare", "points.vrt", "marked.gpkg"]).succeeds();
+    // What leaks is again a table of two columns.
+    let leak = ["-f", "CSV", "xy.csv", "marked.gpkg", "-lco", "GEOMETRY=AS_XY"];
+    host.run("ogr2ogr", &leak).succeeds();
+    let xy = std::fs::read_to_string(host.path("xy.csv")).unwrap();
+    std::fs::write(host.path("suspect.csv"), xy.replacen("X,Y", "lon,lat", 1)).unwrap();
+    let convert: Vec<&str> = block("sh").split_whitespace().collect();
+    host.run(convert[0], &convert[1..]).succeeds();
+    host.matches("points.vrt", &["--record", "acme.json", "suspect.gpkg"]);
+}
