@@ -27,6 +27,7 @@ pub enum Error {
     RepeatedOption(&'static str),
     EmptyOption(&'static str),
     EmptyName { option: &'static str, value: String },
+    Quotes { option: &'static str, value: String },
     IllegalValue { option: &'static str, value: String, kind: Kind },
     BothSubjects,
     NoReference,
@@ -113,6 +114,11 @@ impl Error {
             Error::EmptyName { option, value } => {
                 format!("{} has an empty name between its commas", spelling.value(option, value))
             }
+            Error::Quotes { option, value } => format!(
+                "{} has a double quote that is not closed, or text after one: write a name with a comma as \"a,b\", and \
+                 a quote inside it twice",
+                spelling.value(option, value)
+            ),
             Error::IllegalValue { option, value, kind } => {
                 format!("{} is not {}", spelling.value(option, value), kind.legal())
             }

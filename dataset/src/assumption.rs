@@ -1,7 +1,7 @@
 //! Assumptions about maps whose CRS is missing or wrong: which CRS their numbers may be in, given where on earth
 //! they should be.
 
-use crate::{CoordinateSystem, Result, Survey, survey::reproject};
+use crate::{CoordinateSystem, Result, Survey, crs::reproject};
 use meshmark_core::vertices::VertexTable;
 
 /// EPSG codes of projected CRS and their areas of use: code, west, south, east, north in degrees.

@@ -1,12 +1,15 @@
 //! Coordinate reference systems: metres per unit, labels, and the traditional axis order everywhere.
 
-use crate::{Error, Result};
+use crate::{Error, Result, crs_wkt as wkt};
 use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
 use meshmark_core::{
     ground::Ground,
     scale::{Scale, ScaleLattice},
     vertices::VertexTable,
 };
+
+/// What a CRS is called that has no name.
+const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
 
 /// The CRS of a map.
 #[derive(Debug, Clone)]
@@ -35,9 +38,31 @@ impl CoordinateSystem {
         self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
     }
 
-    /// Whether both mean the same coordinates.
+    /// What messages call it: "EPSG:3067", or its name when it has no code.
+    pub fn brief_name(&self) -> String {
+        let name = || self.0.name().filter(|name| !NO_NAMES.iter().any(|no| no.eq_ignore_ascii_case(name)));
+        let or_name = self.0.authority().ok().or_else(name);
+        or_name.or_else(|| self.0.to_proj4().ok()).unwrap_or_else(|| "unknown CRS".into())
+    }
+
+    /// What messages call two that are not the same: brief names, and what they mean where those are equal.
+    pub fn names_apart(&self, other: &CoordinateSystem) -> [String; 2] {
+        let names = [self, other].map(CoordinateSystem::brief_name);
+        if names[0] != names[1] {
+            return names;
+        }
+        [self, other].map(|crs| format!("{}, {}", names[0], crs.0.to_proj4().unwrap_or_default().trim()))
+    }
+
+    /// Whether both mean the same x and y; the map has no use for heights.
     pub fn is_same(&self, other: &CoordinateSystem) -> bool {
-        self.0 == other.0
+        self.0 == other.0 || self.horizontal().is_some_and(|own| Some(own) == other.horizontal())
+    }
+
+    /// The CRS of x and y alone, in this order.
+    fn horizontal(&self) -> Option<SpatialRef> {
+        let horizontal = SpatialRef::from_wkt(&wkt::horizontal(&self.0.to_wkt().ok()?)?).ok()?;
+        Some(Self::new(horizontal).0)
     }
 
     /// The transformation of coordinates from this CRS into `target`.
@@ -75,7 +100,7 @@ impl CoordinateSystem {
 
     fn ground(&self, table: &VertexTable) -> Result<Ground> {
         if self.0.is_geocentric() {
-            return Err(Error::Geocentric(self.label()));
+            return Err(Error::Geocentric(self.brief_name()));
         }
         if self.0.is_geographic() {
             return Ok(self.ellipsoid(&self.0)?);
@@ -185,6 +210,25 @@ pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Res
     Ok(Ground::Plane { metres_per_unit: 1.0 })
 }
 
+/// Brings coordinates into `target`; those of a layer without a CRS are taken to be in it.
+pub(crate) fn reproject(
+    coords: &mut [[f64; 2]],
+    from: Option<&CoordinateSystem>,
+    target: &CoordinateSystem,
+    layer: &str,
+) -> Result<()> {
+    let Some(from) = from.filter(|from| !from.is_same(target) && !coords.is_empty()) else { return Ok(()) };
+    let failed = |error: gdal::errors::GdalError| Error::Reprojection {
+        layer: layer.into(),
+        reason: error.to_string(),
+    };
+    let (mut x, mut y): (Vec<f64>, Vec<f64>) = coords.iter().map(|p| (p[0], p[1])).unzip();
+    let transform = from.transform_to(target).map_err(failed)?;
+    transform.transform_coords(&mut x, &mut y, &mut []).map_err(failed)?;
+    coords.iter_mut().zip(x.into_iter().zip(y)).for_each(|(p, (x, y))| *p = [x, y]);
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,6 +259,53 @@ mod tests {
         let table = |x| VertexTable::new(vec![[x, 60.0]]).unwrap();
         assert!(matches!(ground(None, &table(25.0)), Err(Error::NoCrs)));
         assert_eq!(ground(None, &table(2500.0)).unwrap(), Ground::Plane { metres_per_unit: 1.0 });
+    }
+
+    #[test]
+    fn what_differs_in_heights_or_in_the_order_of_its_axes_is_the_same_and_the_rest_is_not() {
+        let same = |a: &str, b: &str| parse_srs(a).unwrap().is_same(&parse_srs(b).unwrap());
+        for horizontal in ["EPSG:3067", "EPSG:5048"] {
+            for other in ["EPSG:3067", "EPSG:5048", "EPSG:3067+3900", "EPSG:3067+5717", "EPSG:3903"] {
+                assert!(same(horizontal, other) && same(other, horizontal), "{horizontal} {other}");
+            }
+        }
+        for other in ["EPSG:4979", "EPSG:9518", "EPSG:4326+5773", "OGC:CRS84"] {
+            assert!(same("EPSG:4326", other) && same(other, "EPSG:4979"), "{other}");
+        }
+        for (a, b) in [
+            ("EPSG:3067+3900", "EPSG:3857"),
+            ("EPSG:3903", "EPSG:25836"),
+            ("EPSG:4979", "EPSG:4937"),
+            ("EPSG:9518", "EPSG:4258"),
+            ("EPSG:2393", "EPSG:3067"),
+            ("EPSG:2053", "EPSG:2054"),
+        ] {
+            assert!(!same(a, b) && !same(b, a), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_compound_crs_is_measured_like_its_horizontal_part() {
+        let at = |srs| metres_per_unit(srs, [500_000.0, 6_700_000.0]);
+        assert_eq!(at("EPSG:3067+3900"), at("EPSG:3067"));
+        assert_eq!(at("EPSG:3903"), at("EPSG:3067"));
+        let at = |srs| metres_per_unit(srs, [25.0, 60.0]);
+        assert_eq!(at("EPSG:9518"), at("EPSG:4326"));
+        let places = |srs| parse_srs(srs).unwrap().degrees(&[[385_000.0, 6_672_000.0]])[0].unwrap();
+        let ([a, b], [c, d]) = (places("EPSG:3903"), places("EPSG:3067"));
+        assert!((a - c).abs() < 1e-9 && (b - d).abs() < 1e-9, "{a} {b} {c} {d}");
+    }
+
+    #[test]
+    fn messages_name_a_crs_by_its_code_or_its_name_and_tell_those_of_one_name_apart() {
+        let crs = |text: &str| parse_srs(text).unwrap();
+        assert_eq!(crs("EPSG:3903").brief_name(), "EPSG:3903");
+        assert_eq!(crs("EPSG:3067+3900").brief_name(), "ETRS89 / TM35FIN(E,N) + N2000 height");
+        let [utm35, utm36] = ["+proj=utm +zone=35 +ellps=GRS80", "+proj=utm +zone=36 +ellps=GRS80"].map(crs);
+        assert!(utm35.brief_name().contains("+zone=35"), "{}", utm35.brief_name());
+        let named = |zone: &CoordinateSystem| crs(&zone.label().replacen("\"unknown\"", "\"Town grid\"", 1));
+        let [a, b] = named(&utm35).names_apart(&named(&utm36));
+        assert!(a.starts_with("Town grid, ") && a.contains("+zone=35") && b.contains("+zone=36"), "{a} {b}");
     }
 
     #[test]

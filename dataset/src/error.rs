@@ -14,6 +14,7 @@ pub enum Error {
     UnknownSrs(String),
     Geocentric(String),
     NotFinite { layer: String, fid: String, x: f64, y: f64 },
+    TooFar { layer: String, fid: String, x: f64, y: f64 },
     Geometry { layer: String, fid: String, reason: String },
     Unreadable { layer: String, reason: String },
     Reprojection { layer: String, reason: String },
@@ -85,9 +86,14 @@ impl Error {
                     "the CRS {crs} is geocentric, and a map needs a projected or geographic one: reproject first"
                 )
             }
-            Error::NotFinite { layer, fid, x, y } => {
-                format!("layer \"{layer}\", feature {fid}: the coordinates ({x}, {y}) are not finite numbers")
-            }
+            Error::NotFinite { layer, fid, x, y } => format!(
+                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are not finite numbers: correct the \
+                 feature, or leave it out"
+            ),
+            Error::TooFar { layer, fid, x, y } => format!(
+                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are further away than any place in the \
+                 CRS of the map: correct the feature, or leave it out"
+            ),
             Error::Geometry { layer, fid, reason } => format!("layer \"{layer}\", feature {fid}: {reason}"),
             Error::Unreadable { layer, reason } => {
                 format!("layer \"{layer}\" cannot be read to its end: {reason}")

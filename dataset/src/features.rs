@@ -1,6 +1,6 @@
 //! Geometries one by one, for comparing two maps feature by feature.
 
-use crate::{Error, Outline, Result, survey::chosen_layers, turns::turn};
+use crate::{CoordinateSystem, Error, Outline, Result, extent::Extent, survey::chosen_layers, turns::turn};
 use gdal::{Dataset, vector::LayerAccess};
 
 /// One geometry of a dataset.
@@ -18,8 +18,8 @@ pub struct FeatureGeometry {
 /// without one are left out. `last_failure` is as in [`crate::Selection`].
 ///
 /// # Errors
-/// A layer that does not exist or cannot be read to its end, a geometry that makes no sense, coordinates that are not
-/// finite.
+/// A layer that does not exist or cannot be read to its end, a geometry that makes no sense, coordinates that are no
+/// place.
 pub fn features(
     dataset: &Dataset,
     layers: Option<&[String]>,
@@ -29,20 +29,18 @@ pub fn features(
     for (index, name) in chosen_layers(dataset, layers)? {
         let _turn = turn(dataset, &name)?;
         let mut layer = dataset.layer(index)?;
-        let columns = layer.defn().geom_fields().count();
+        let srs = layer.defn().geom_fields().map(|field| field.spatial_ref().ok());
+        let crs = srs.map(|srs| srs.and_then(CoordinateSystem::of_layer));
+        let extents: Vec<Extent> = crs.map(|crs| Extent::of(crs.as_ref())).collect();
         for feature in layer.features() {
-            for column in 0..columns {
+            for (column, extent) in extents.iter().enumerate() {
                 let Ok(geometry) = feature.geometry_by_index(column) else { continue }; // a null geometry
                 let fid = feature.fid();
                 let id = || fid.map_or("without id".into(), |fid| fid.to_string());
                 let failed = |reason: String| Error::Geometry { layer: name.clone(), fid: id(), reason };
                 let wkb = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
                 let outline = Outline::of_wkb(wkb).map_err(|error| failed(error.to_string()))?;
-                if let Some(&[x, y]) =
-                    outline.chains.iter().flatten().find(|p| !p.iter().all(|v| v.is_finite()))
-                {
-                    return Err(Error::NotFinite { layer: name.clone(), fid: id(), x, y });
-                }
+                outline.chains.iter().flatten().try_for_each(|&point| extent.check(point, &name, id))?;
                 all.push(FeatureGeometry { layer: name.clone(), fid, outline });
             }
         }

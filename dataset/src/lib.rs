@@ -5,8 +5,10 @@
 
 mod assumption;
 mod crs;
+mod crs_wkt;
 pub mod decimals;
 mod error;
+mod extent;
 mod features;
 mod file_id;
 pub mod formats;

@@ -91,7 +91,7 @@ pub fn check_scale(map: &Map, crs: Option<&CoordinateSystem>) -> Result<()> {
     match map.measure().worst_vertex(map.vertices) {
         None => Ok(()),
         Some((at, off)) => {
-            let crs = crs.map_or_else(String::new, CoordinateSystem::label);
+            let crs = crs.map_or_else(String::new, CoordinateSystem::brief_name);
             Err(Error::UnevenScale { at, off_percent: 100.0 * off, crs })
         }
     }

@@ -1,7 +1,10 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    CoordinateSystem, Error, Geometries, Label, Result, Shape, crs, labels, parse_srs, shapes,
+    CoordinateSystem, Error, Geometries, Label, Result, Shape,
+    crs::{self, reproject},
+    extent::Extent,
+    labels, parse_srs, shapes,
     turns::turn,
     wkb::{self, Step},
 };
@@ -10,7 +13,8 @@ use gdal::{
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{
-    disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice, vertices::VertexTable,
+    disjoint_sets::DisjointSets, ground::Ground, map::Map, options::join_list, scale::ScaleLattice,
+    vertices::VertexTable,
 };
 use std::collections::BTreeMap;
 
@@ -219,7 +223,7 @@ pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Res
         return Err(Error::NoLayers);
     }
     if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
-        return Err(Error::UnknownLayer { name: name.clone(), known: known.join(", ") });
+        return Err(Error::UnknownLayer { name: name.clone(), known: join_list(&known) });
     }
     let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
     Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())
@@ -314,7 +318,11 @@ impl Walk<'_> {
         for feature in layer.features() {
             features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
-                read_geometry(&feature, column, name, self.selection.geometries, chains)?;
+                let extent = match self.selection.target {
+                    Target::Own => Extent::of(columns[column].as_ref()),
+                    Target::Crs(_) | Target::Raw => Extent::ANY, // its CRS may be another than it says
+                };
+                read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
             }
             let vertices =
                 self.chains.coords.len() + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
@@ -339,9 +347,11 @@ impl Walk<'_> {
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             reproject(&mut points, crs.as_ref(), target, name)?;
             labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
-            for shape in &mut self.shapes[first_shape..] {
-                reproject(&mut shape.vertices, crs.as_ref(), target, name)?;
-            }
+            let shapes = &mut self.shapes[first_shape..];
+            let mut vertices: Vec<_> = shapes.iter().flat_map(|shape| &shape.vertices).copied().collect();
+            reproject(&mut vertices, crs.as_ref(), target, name)?;
+            let places = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
+            places.zip(vertices).for_each(|(place, vertex)| *place = vertex);
         }
         Ok(features)
     }
@@ -366,7 +376,8 @@ impl Walk<'_> {
         let given = self.selection.srs.map(parse_srs).transpose()?;
         let crs = |own: Option<CoordinateSystem>| match (own, &given) {
             (Some(own), Some(given)) if !own.is_same(given) => {
-                Err(Error::ContradictingSrs { crs: own.label(), srs: given.label() })
+                let [crs, srs] = own.names_apart(given);
+                Err(Error::ContradictingSrs { crs, srs })
             }
             (Some(own), _) => Ok(Some(own)),
             (None, given) => Ok(given.clone()),
@@ -386,16 +397,15 @@ impl Walk<'_> {
             (None, None) => true,
             _ => false,
         };
-        let label = |crs: &Option<CoordinateSystem>| crs.as_ref().map_or("no CRS".into(), |c| c.label());
         if same {
             return Ok(());
         }
-        Err(Error::MixedCrs {
-            first: first.clone(),
-            first_crs: label(first_crs),
-            second: layer.into(),
-            second_crs: label(crs),
-        })
+        let name = |crs: &Option<CoordinateSystem>| crs.as_ref().map_or("no CRS".into(), |c| c.brief_name());
+        let [first_crs, second_crs] = match (first_crs, crs) {
+            (Some(a), Some(b)) => a.names_apart(b),
+            _ => [name(first_crs), name(crs)],
+        };
+        Err(Error::MixedCrs { first: first.clone(), first_crs, second: layer.into(), second_crs })
     }
 }
 
@@ -404,7 +414,7 @@ fn read_geometry(
     feature: &Feature,
     column: usize,
     layer: &str,
-    keeps_geometries: bool,
+    (keeps_geometries, extent): (bool, Extent),
     chains: &mut Chains,
 ) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
@@ -415,12 +425,10 @@ fn read_geometry(
         chains.others.insert(chains.firsts.len() as u32, bytes.clone());
     }
     chains.begin_geometry();
-    let mut visit = |step, [x, y]: [f64; 2]| {
-        if !x.is_finite() || !y.is_finite() {
-            return Err(Error::NotFinite { layer: layer.into(), fid: fid(), x, y });
-        }
-        chains.push(step, [x, y]);
-        Ok([x, y])
+    let mut visit = |step, point: [f64; 2]| {
+        extent.check(point, layer, fid)?;
+        chains.push(step, point);
+        Ok(point)
     };
     match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
         visit(step, point).map_err(Visit::Ours)
@@ -440,25 +448,6 @@ impl From<wkb::WkbError> for Visit {
     fn from(error: wkb::WkbError) -> Self {
         Visit::Wkb(error)
     }
-}
-
-/// Brings coordinates into `target`; those of a layer without a CRS are taken to be in it.
-pub(crate) fn reproject(
-    coords: &mut [[f64; 2]],
-    from: Option<&CoordinateSystem>,
-    target: &CoordinateSystem,
-    layer: &str,
-) -> Result<()> {
-    let Some(from) = from.filter(|from| !from.is_same(target) && !coords.is_empty()) else { return Ok(()) };
-    let failed = |error: gdal::errors::GdalError| Error::Reprojection {
-        layer: layer.into(),
-        reason: error.to_string(),
-    };
-    let (mut x, mut y): (Vec<f64>, Vec<f64>) = coords.iter().map(|p| (p[0], p[1])).unzip();
-    let transform = from.transform_to(target).map_err(failed)?;
-    transform.transform_coords(&mut x, &mut y, &mut []).map_err(failed)?;
-    coords.iter_mut().zip(x.into_iter().zip(y)).for_each(|(p, (x, y))| *p = [x, y]);
-    Ok(())
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use gdal::{
 };
 use meshmark_host_tests::{
     contents::{self, lengths, moves},
-    plugin::Host,
+    plugin::{self, Host},
 };
 
 /// A map of one layer.
@@ -291,4 +291,109 @@ fn a_map_smaller_than_its_mark_is_refused() {
         let map = Map::new(srs, polygons(&at([0.0, 0.0], [1e-9, 1e-9])));
         refuses(&map, "lower TOLERANCE and AMPLITUDE");
     }
+}
+
+#[test]
+fn layers_whose_crs_differ_only_in_heights_are_marked_together() {
+    let host = Host::new();
+    let fixture = plugin::fixture("helsinki.gpkg").display().to_string();
+    for (layer, srs) in [("buildings", "EPSG:3067"), ("roads", "EPSG:3903"), ("landuse", "EPSG:3067+3900")] {
+        let more = ["-update", "map.gpkg", &fixture, layer, "-a_srs", srs, "-nlt", "CONVERT_TO_LINEAR"];
+        let skip = usize::from(!host.path("map.gpkg").exists());
+        host.run("ogr2ogr", &more[skip..]).succeeds();
+    }
+    host.mark("GPKG", "read.gpkg", "map.gpkg", &["-oo", "RECORD=read.json"]).succeeds();
+    let report = host.matches("map.gpkg", &["--record", "read.json", "read.gpkg"]);
+    assert_eq!(report["parameters"]["crs"], "EPSG:3067");
+    let (read, map) = (contents::read(&host.path("read.gpkg")), contents::read(&host.path("map.gpkg")));
+    let (_, longest) = lengths(&moves(&map, &read));
+    assert!(longest > 0.0 && longest < 0.76, "{longest}");
+    host.create("out.gpkg", "map.gpkg", &["-dsco", "SRS=EPSG:3067"]).succeeds();
+    assert!(contents::read(&host.path("out.gpkg")) == read);
+    host.run("ogr2ogr", &["-t_srs", "EPSG:3857", "moved.gpkg", "read.gpkg"]).succeeds();
+    host.matches("map.gpkg", &["--record", "read.json", "moved.gpkg"]);
+    // A CRS without a code that is another one is named in a few words.
+    let more = ["-update", "map.gpkg", &fixture, "amenities", "-t_srs", "EPSG:3857+3900"];
+    host.run("ogr2ogr", &more).succeeds();
+    let run = host.mark("GPKG", "mixed.gpkg", "map.gpkg", &[]);
+    let words =
+        "(EPSG:3067) and \"amenities\" (WGS 84 / Pseudo-Mercator + N2000 height) are not in the same CRS";
+    assert!(run.code == Some(1) && run.stderr.contains(words), "{}", run.stderr);
+}
+
+#[test]
+fn a_coordinate_further_away_than_any_place_is_found_by_layer_and_feature_in_every_way() {
+    let places = [("EPSG:3067", "1e308 2"), ("EPSG:3067", "3 -1e308"), ("EPSG:3067", "3 1e31")];
+    for (srs, bad) in places.into_iter().chain([("EPSG:3067", "1e20 4"), ("EPSG:4326", "25 1e20")]) {
+        let mut features: Vec<String> = (0..9).map(|i| format!("POINT ({i} {})", 50 + i * i % 7)).collect();
+        features[7] = format!("POINT ({bad})");
+        let map = Map::new(srs, features);
+        let words = "layer \"map\", feature 8: the coordinates (";
+        refuses(&map, words);
+        let host = Host::new();
+        map.write(&host);
+        std::fs::write(host.path("list.csv"), "recipient\nACME GmbH\n").unwrap();
+        let before = host.files();
+        let list = ["--key", "key.json", "--recipients", "list.csv", "--output-dir", "out", "map.gpkg"];
+        let run = host.run(host.meshmark().to_str().unwrap(), &[&["distribute"], &list[..]].concat());
+        assert!(run.code == Some(5) && run.stderr.contains(words), "{bad}: {}", run.stderr);
+        assert!(run.stderr.contains("further away than any place") && run.stderr.contains("leave it out"));
+        assert!(host.files() == before, "{bad}: {:?}", host.names());
+    }
+}
+
+#[test]
+fn a_layer_with_a_comma_or_quotes_in_its_name_is_named_in_quotes() {
+    let host = Host::new();
+    host.copy("helsinki.gpkg", "plain.gpkg");
+    for (layer, name) in [("buildings", "a,b"), ("roads", "say \"c\"")] {
+        let more = ["-update", "map.gpkg", "plain.gpkg", layer, "-nln", name];
+        host.run("ogr2ogr", &more[usize::from(!host.path("map.gpkg").exists())..]).succeeds();
+    }
+    for (number, layers) in [r#""a,b""#, r#"say "c", "a,b""#, r#""say ""c""""#].iter().enumerate() {
+        let option = format!("LAYERS={layers}");
+        let (copy, record) = (format!("{number}.gpkg"), format!("{number}.json"));
+        let options = ["-oo", &option, "-oo", &format!("RECORD={record}")];
+        host.mark("GPKG", &copy, "map.gpkg", &options).succeeds();
+        host.matches("map.gpkg", &["--record", &record, &copy]);
+        host.matches("map.gpkg", &["--recipient", "ACME GmbH", "--layers", layers, &copy]);
+        let compare = ["compare", "--layers", layers, "map.gpkg", &copy];
+        host.run(host.meshmark().to_str().unwrap(), &compare).succeeds();
+    }
+    let run = host.mark("GPKG", "none.gpkg", "map.gpkg", &["-oo", "LAYERS=a,b"]);
+    let words = r#"the map has no layer "a": LAYERS may name "a,b", say "c""#;
+    assert!(run.code == Some(1) && run.stderr.contains(words), "{}", run.stderr);
+}
+
+#[test]
+fn a_csv_file_with_two_columns_of_coordinates_is_marked_and_verified_as_the_page_on_formats_says() {
+    let page = include_str!("../../docs/formats.md");
+    let block = |kind: &str| {
+        let (_, rest) = page.split_once(&format!("```{kind}\n")).expect("the page has it");
+        rest.split_once("```").expect("it ends").0
+    };
+    let host = Host::new();
+    let place = degrees(24.9, 60.1);
+    let row = |i: usize| {
+        let [lon, lat] = place([scattered(i) * 2000.0, scattered(i + 7777) * 2000.0]);
+        format!("p{i},{lon:.6},{lat:.6}\n")
+    };
+    let rows: String = (0..700).map(row).collect();
+    std::fs::write(host.path("points.csv"), format!("name,lon,lat\n{rows}")).unwrap();
+    std::fs::write(host.path("points.vrt"), block("xml")).unwrap();
+    host.mark("GPKG", "marked.gpkg", "points.vrt", &["-oo", "RECORD=acme.json"]).succeeds();
+    host.matches("points.vrt", &["--record", "acme.json", "marked.gpkg"]);
+    let fields =
+        host.run("ogrinfo", &["-so", "-q", "marked.gpkg", "-sql", "SELECT * FROM points"]).succeeds();
+    assert!(!fields.stdout.contains("lon") && !fields.stdout.contains("lat:"), "{}", fields.stdout);
+    let meshmark = host.meshmark();
+    host.run(meshmark.to_str().unwrap(), &["compare", "points.vrt", "marked.gpkg"]).succeeds();
+    // What leaks is again a table of two columns.
+    let leak = ["-f", "CSV", "xy.csv", "marked.gpkg", "-lco", "GEOMETRY=AS_XY"];
+    host.run("ogr2ogr", &leak).succeeds();
+    let xy = std::fs::read_to_string(host.path("xy.csv")).unwrap();
+    std::fs::write(host.path("suspect.csv"), xy.replacen("X,Y", "lon,lat", 1)).unwrap();
+    let convert: Vec<&str> = block("sh").split_whitespace().collect();
+    host.run(convert[0], &convert[1..]).succeeds();
+    host.matches("points.vrt", &["--record", "acme.json", "suspect.gpkg"]);
 }

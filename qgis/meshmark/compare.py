@@ -51,7 +51,7 @@ class Compare(Algorithm):
         )
         self.add(
             QgsProcessingParameterString("LAYERS", tr("Layers to compare"), optional=True),
-            tr("Names of layers, separated by commas; all when empty."),
+            tr("Names of layers, separated by commas, those with a comma in double quotes; all when empty."),
         )
         kind = QgsProcessingParameterNumber.Type.Double
         self.add(

@@ -90,7 +90,7 @@ fn in_place(
 impl Registered {
     fn new(map: Survey, assumption: Option<&Assumption>, registration: Registration) -> Self {
         let read_as = assumption.map(|assumed| ReadAs {
-            crs: printable(&assumed.crs.label()),
+            crs: printable(&assumed.crs.brief_name()),
             axes_swapped: assumed.axes_swapped,
         });
         Registered { map, registration: Registration { read_as, ..registration } }

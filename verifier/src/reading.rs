@@ -309,7 +309,7 @@ fn is_plain(sql: &str) -> bool {
 fn crs_of(dataset: &Dataset) -> Vec<String> {
     let label = |layer: gdal::vector::Layer| {
         let crs = layer.spatial_ref().and_then(CoordinateSystem::of_layer);
-        crs.map(|crs| printable(&crs.label())).unwrap_or_else(|| "no CRS".into())
+        crs.map(|crs| printable(&crs.brief_name())).unwrap_or_else(|| "no CRS".into())
     };
     dataset.layers().map(label).collect::<BTreeSet<_>>().into_iter().collect()
 }

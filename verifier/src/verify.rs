@@ -209,7 +209,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         registration,
         vertices,
         reference_digest: reference.vertices.digest(),
-        crs: reference.crs.as_ref().map(|crs| crs.label()),
+        crs: reference.crs.as_ref().map(|crs| crs.brief_name()),
         suspect_crs,
         found: Err(unregistered(&vertices, chance, start)),
         decoys: None,

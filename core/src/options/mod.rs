@@ -1,10 +1,12 @@
 //! The watermark options: one table that makes the driver's option list, the parser, the flags of
 //! the command line and the table in the docs.
 
+mod list;
 mod listing;
 mod parameters;
 mod table;
 
+pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
 pub use parameters::{Laplacian, Parameters, Shape};
 pub use table::{CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, Spelling, spec};
@@ -160,7 +162,7 @@ impl<'a> Values<'a> {
 
     fn list(&self, option: &'static str) -> Result<Option<Vec<String>>> {
         let Some(value) = self.text(option)? else { return Ok(None) };
-        let names: Vec<String> = value.split(',').map(|n| n.trim().to_string()).collect();
+        let Some(names) = split_list(&value) else { return Err(Error::Quotes { option, value }) };
         if names.iter().any(String::is_empty) {
             return Err(Error::EmptyName { option, value });
         }
@@ -289,6 +291,9 @@ mod tests {
         assert!(error(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).contains("exactly one"));
         assert!(error(&[("MESSAGE", "xyz")]).contains("hexadecimal"));
         assert!(error(&[("LAYERS", "a,,b")]).contains("empty name"));
+        assert!(
+            error(&[("LAYERS", r#""a,b"#)]).contains(r#"LAYERS="a,b has a double quote that is not closed"#)
+        );
     }
 
     #[test]

@@ -156,7 +156,7 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         true,
-        "Comma-separated layers to mark together; the others pass unchanged; all by default",
+        "Comma-separated layers to mark together, those with a comma in double quotes; the others pass unchanged; all by default",
     ),
     row(
         "SHAPE",

@@ -72,9 +72,9 @@ pub(super) struct CompareArgs {
     pub(super) reference: PathBuf,
     /// The marked map
     pub(super) marked: PathBuf,
-    /// Comma-separated layers to compare; all by default
-    #[arg(long, value_delimiter = ',')]
-    pub(super) layers: Vec<String>,
+    /// Comma-separated layers to compare, those with a comma in double quotes; all by default
+    #[arg(long)]
+    pub(super) layers: Option<String>,
     /// Grid of the marked map, CRS units: overlaps up to a cell of it count as slivers
     #[arg(long)]
     pub(super) precision: Option<f64>,

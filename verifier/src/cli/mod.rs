@@ -94,11 +94,12 @@ fn write_package_files(folder: &Path) -> Result<ExitCode> {
 }
 
 fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
-    let layers = (!args.layers.is_empty()).then_some(args.layers.as_slice());
+    let layers = Options::parse(args.layers.as_deref().map(|layers| ("LAYERS", layers)))?.layers;
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let provenance =
         file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
-    let mut comparison = compare(&args.reference, &args.marked, layers, args.precision, file.is_some())?;
+    let mut comparison =
+        compare(&args.reference, &args.marked, layers.as_deref(), args.precision, file.is_some())?;
     let detail = comparison.detail.take(); // a report file has it
     print(&if args.json { comparison.to_json() } else { comparison.to_text() })?;
     if let Some((file, mut detail)) = file.zip(detail) {

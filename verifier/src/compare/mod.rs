@@ -14,7 +14,7 @@ use meshmark_core::{
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
     map::Map,
     scale::Measure,
-    vertices::{VertexTable, WIDEST},
+    vertices::VertexTable,
 };
 use meshmark_dataset::{
     FeatureGeometry, Outline,
@@ -112,21 +112,13 @@ pub fn compare(
             counted(b, "geometry")
         )));
     }
-    // The reference was surveyed, the other map was not: it may be as far away as numbers go.
-    let mut values = after.iter().flat_map(|feature| feature.outline.chains.iter().flatten().flatten());
-    if let Some(value) = values.find(|value| value.abs() > WIDEST) {
-        let marked = marked.display();
-        return Err(Error::Unreadable(format!(
-            "the marked map {marked} has a coordinate of {value:e}: no map is so wide"
-        )));
-    }
     let places = before.iter().zip(&after).find_map(|(a, b)| a.outline.first().zip(b.outline.first()));
     let away_m = places
         .map_or(0.0, |(from, to)| measure.metres_between(from, to).iter().fold(0.0, |a: f64, b| a.hypot(*b)));
     if let (Some(own), Some(other), true) = (own, other, away_m > MOST_AWAY_M)
         && !own.is_same(&other)
     {
-        let (marked, own, other) = (marked.display(), own.label(), other.label());
+        let (marked, [own, other]) = (marked.display(), own.names_apart(&other));
         return Err(Error::Usage(format!(
             "the marked map {marked} is in {other} and the reference in {own}: compare the copy that was marked, before it \
              is brought into another CRS"

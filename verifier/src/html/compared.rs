@@ -10,7 +10,7 @@ use crate::{
     report::{Report, clipped, printable},
 };
 use maud::{Markup, html};
-use meshmark_core::counted;
+use meshmark_core::{counted, options::join_list};
 
 pub fn compared(report: &Report) -> Markup {
     let content = html! {
@@ -80,7 +80,7 @@ pub fn settings(report: &Report) -> Markup {
         word(&p.basis)
     );
     let grid = p.precision_crs_units.map(|grid| html! { (grid) " CRS units" });
-    let layers = p.layers.as_ref().map(|layers| html! { (printable(&layers.join(", "))) });
+    let layers = p.layers.as_ref().map(|layers| html! { (printable(&join_list(layers))) });
     let content = table(&[
         (
             "Amplitude",
