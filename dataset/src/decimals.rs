@@ -201,7 +201,6 @@ mod tests {
             point.add_point_2d((number, number));
             layer.create_feature(point).unwrap();
         }
-        drop(layer);
         file.close().unwrap();
         let file = Dataset::open(&path).unwrap();
         let mut layer = file.layer(0).unwrap();
