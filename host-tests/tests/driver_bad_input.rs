@@ -184,7 +184,7 @@ fn vertices_on_one_line_or_in_one_place_have_no_mesh() {
     write_points(&host, "line.json", (0..600).map(|i| format!("{}, {}", 300000 + 3 * i, 6700000 + 2 * i)));
     refuses_map(&host, "line.json", &[], &["600 distinct vertices", "one straight line"]);
     write_points(&host, "place.json", (0..600).map(|_| "300000, 6700000".into()));
-    refuses_map(&host, "place.json", &[], &["1 distinct vertices", "at least 16"]);
+    refuses_map(&host, "place.json", &[], &["1 distinct vertex,", "at least 16"]);
 }
 
 #[test]
