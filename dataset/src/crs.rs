@@ -130,7 +130,17 @@ impl CoordinateSystem {
         let (along_x, along_y) = (side(0, 1), side(2, 3));
         let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
         let measured = area.sqrt() / (2.0 * local.step);
-        (measured.is_finite() && measured > 0.0).then_some(measured)
+        let measured = (measured.is_finite() && measured > 0.0).then_some(measured)?;
+        // Across the 180th meridian and about a pole, differences of longitudes are no lengths.
+        let in_space = local.scales(&[place]).pop().flatten().map(|scale| {
+            let [least, largest] = scale.extremes;
+            (least * largest).sqrt()
+        });
+        Some(
+            in_space
+                .filter(|true_scale| (measured / true_scale - 1.0).abs() > NEGLIGIBLE)
+                .unwrap_or(measured),
+        )
     }
 }
 
@@ -252,6 +262,24 @@ mod tests {
         assert!((x - 0.3048).abs() < 1e-4, "New York, US survey feet: {x}");
         let [x, y] = metres_per_unit("EPSG:4326", [25.0, 60.0]);
         assert!((x - 55_800.0).abs() < 10.0 && (y - 111_412.0).abs() < 10.0, "{x} {y}");
+    }
+
+    #[test]
+    fn neither_the_180th_meridian_nor_a_pole_spoils_the_scale() {
+        let [x, _] = metres_per_unit("EPSG:32601", [386_000.0, 7_770_000.0]);
+        for east in (385_000..388_000).step_by(10) {
+            let [there, _] = metres_per_unit("EPSG:32601", [f64::from(east), 7_770_000.0]);
+            assert!((there / x - 1.0).abs() < 1e-3, "{east}: {there} {x}");
+        }
+        let crs = parse_srs("EPSG:32601").unwrap();
+        let seam = parse_srs("EPSG:4326").unwrap().transform_to(&crs).unwrap();
+        let (mut lon, mut lat) = ([180.0], [70.0]);
+        seam.transform_coords(&mut lon, &mut lat, &mut []).unwrap();
+        let [at_seam, _] = metres_per_unit("EPSG:32601", [lon[0], lat[0]]);
+        assert!((at_seam - 1.0).abs() < 0.01, "{at_seam}");
+        let [pole, _] = metres_per_unit("EPSG:3995", [1.0, 2.0]);
+        let [beside, _] = metres_per_unit("EPSG:3995", [100_000.0, 2.0]);
+        assert!((pole / beside - 1.0).abs() < 1e-3, "{pole} {beside}");
     }
 
     #[test]

@@ -52,6 +52,9 @@ impl Expected {
 /// significance needs.
 const POWER_MARGIN: f64 = 3.0;
 
+/// The weights of the bits cost this share of the largest score of a recipient, √n for n channel bits.
+const MOST_OF_ROOT: f64 = 0.99;
+
 /// What a verdict is about: under any other of these the mark is another one.
 const MARK: &str = "a mark with this key, message, options and reference";
 
@@ -112,6 +115,9 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
     // A message of m bits cannot be hit less often than once in 2^m.
     let least = -(bits as f64) * 2f64.log10();
     let p_random = survival::normal_log10(found.recipient_score(message)).max(least);
+    // The score of a message of which every bit is read alike, but for the weights.
+    let channel_bits = found.estimate.len() as f64;
+    let best = survival::normal_log10(MOST_OF_ROOT * channel_bits.sqrt()).max(least);
     let among_rivals = match expected.null {
         Null::RandomMessage => None,
         Null::AnyOtherMessage => Some(rivals::standing(found, message)),
@@ -124,11 +130,11 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
             "a message of {bits} bits cannot identify anyone: mark with {LEAST_IDENTIFYING_BITS} or more"
         );
         (Verdict::Inconclusive, reason)
-    } else if least >= each.log10() {
-        let among = if tried > 1 { format!(" for each of {tried} records") } else { String::new() };
+    } else if best >= each.log10() {
+        let among = if tried > 1 { format!(" for each of {tried} that were tried") } else { String::new() };
         let reason = format!(
-            "a message of {bits} bits, read without an error, agrees by chance once in 2^{bits} times, and a \
-             significance of {each:.1e}{among} asks for less: give a larger one, or mark with more bits"
+            "a message of {bits} bits, read without an error, has a p-value of 10^{best:.1}, and a significance of \
+             {each:.1e}{among} asks for less: give a larger one, or mark with more bits"
         );
         (Verdict::Inconclusive, reason)
     } else if fits(p_recipient) && is_mixed {
@@ -235,7 +241,7 @@ mod tests {
         let asked = decide_among(&found, &random(&message), 1, 1e-60);
         assert_eq!(asked.verdict, Verdict::Inconclusive);
         assert!(
-            asked.reason.contains("once in 2^128") && asked.reason.contains("1.0e-60"),
+            asked.reason.contains("a p-value of 10^-28.7") && asked.reason.contains("1.0e-60"),
             "{}",
             asked.reason
         );
@@ -243,7 +249,7 @@ mod tests {
         let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
         assert_eq!(decide_among(&found, &random(&short), 1, 1e-6).verdict, Verdict::Match);
         let among = decide_among(&found, &random(&short), 17, 1e-6);
-        assert!(among.reason.contains("for each of 17 records"), "{}", among.reason);
+        assert!(among.reason.contains("for each of 17 that were tried"), "{}", among.reason);
     }
 
     #[test]
