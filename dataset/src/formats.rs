@@ -69,6 +69,11 @@ impl Format {
         self.endings[0]
     }
 
+    /// Whether the driver writes from the text of a GeoJSON file what features do not hold.
+    pub fn has_native_data(&self) -> bool {
+        matches!(self.coordinates, Coordinates::Json { .. })
+    }
+
     /// Whether the driver brings a layer with these options into WGS 84, which would happen after the marking.
     pub fn is_wgs84_only(&self, layer_options: Options) -> bool {
         match self.coordinates {

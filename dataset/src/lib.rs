@@ -12,6 +12,7 @@ mod extent;
 mod features;
 mod file_id;
 pub mod formats;
+pub mod geojson_text;
 mod geometries;
 pub mod geopackage;
 mod labels;

@@ -51,7 +51,7 @@ fn what_a_geojson_file_said_of_its_unmarked_extent_is_in_no_copy() {
     fs::write(host.path("list.csv"), "recipient\nACME GmbH\n").unwrap();
     let says_it = |map: &str| {
         let said = host.run("ogrinfo", &["-so", "-mdd", "all", map, "buildings"]).succeeds().stdout;
-        said.contains("NATIVE_DATA")
+        said.contains("NATIVE_DATA") && !said.contains("\"bbox\":null")
     };
     assert!(says_it("map.gpkg"), "ogr2ogr keeps it");
 

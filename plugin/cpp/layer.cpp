@@ -7,12 +7,13 @@
 
 // Between two looks at the source's files, so that a change is seen before a writer commits.
 constexpr int FEATURES_BETWEEN_CHECKS = 256;
-// The metadata domain in which GDAL keeps members of a GeoJSON file, "bbox" among them.
+// The metadata domain in which GDAL keeps members of a GeoJSON file.
 constexpr const char *NATIVE_DATA = "NATIVE_DATA";
 
 MeshmarkLayer::MeshmarkLayer(MeshmarkDataset &dataset, OGRLayer &source, int number, const MeshmarkMarking *marking)
     : m_dataset(dataset), m_source(source), m_number(number), m_marking(marking),
-      m_marked(source.GetLayerDefn()->GetGeomFieldCount() > 0 && meshmark_marks_layer(marking, source.GetName()))
+      m_marked(source.GetLayerDefn()->GetGeomFieldCount() > 0 && meshmark_marks_layer(marking, source.GetName())),
+      m_nativeData(meshmark_native_data(source.GetMetadata(NATIVE_DATA)))
 {
     SetDescription(source.GetName());
 }
@@ -22,7 +23,7 @@ GDALDataset *MeshmarkLayer::GetDataset()
     return &m_dataset;
 }
 
-// --- metadata: the source's, but for what a GeoJSON file said of its unmarked extent -----------------
+// --- metadata: the source's, but for the unmarked extent that a GeoJSON file has in its words -----------------
 
 static bool IsNativeData(const char *domain)
 {
@@ -31,19 +32,12 @@ static bool IsNativeData(const char *domain)
 
 MeshmarkTexts MeshmarkLayer::GetMetadata(const char *domain)
 {
-    return IsNativeData(domain) ? nullptr : m_source.GetMetadata(domain);
-}
-
-char **MeshmarkLayer::GetMetadataDomainList()
-{
-    char **domains = m_source.GetMetadataDomainList();
-    const int native = CSLFindString(domains, NATIVE_DATA);
-    return native < 0 ? domains : CSLRemoveStrings(domains, native, 1, nullptr);
+    return IsNativeData(domain) ? m_nativeData.List() : m_source.GetMetadata(domain);
 }
 
 const char *MeshmarkLayer::GetMetadataItem(const char *name, const char *domain)
 {
-    return IsNativeData(domain) ? nullptr : m_source.GetMetadataItem(name, domain);
+    return IsNativeData(domain) ? m_nativeData.FetchNameValue(name) : m_source.GetMetadataItem(name, domain);
 }
 
 // --- reading -------------------------------------------------------------------------------------
@@ -130,6 +124,8 @@ OGRErr MeshmarkLayer::SetNextByIndex(GIntBig index)
 
 bool MeshmarkLayer::Mark(OGRFeature &feature)
 {
+    if (feature.GetNativeData())
+        meshmark_clear_native_data(OGRFeature::ToHandle(&feature));
     for (int field = 0; m_marked && field < feature.GetGeomFieldCount(); field++)
     {
         if (!MarkGeometry(feature, field))

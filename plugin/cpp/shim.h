@@ -58,6 +58,11 @@ extern "C"
     // False and a failure when layer number `number` has not given as many features as it had when it was marked.
     bool meshmark_is_complete(const MeshmarkMarking *, const char *layer, int number, uint64_t features);
 
+    // Leaves places out of the native data of a feature (src/ffi_native_data.rs).
+    void meshmark_clear_native_data(OGRFeatureH);
+    // The native data of a layer, without places; the caller frees it.
+    char **meshmark_native_data(CSLConstList metadata);
+
     // Whether writing to `name` would destroy the source of an open marked dataset.
     bool meshmark_is_being_read(const char *name);
     // Says that it is being read, and first saves a copy if something may write to it all the same.
@@ -130,10 +135,10 @@ class MeshmarkLayer final : public OGRLayer
 #endif
 
     MeshmarkTexts GetMetadata(const char *domain) override;
-    char **GetMetadataDomainList() override;
     const char *GetMetadataItem(const char *name, const char *domain) override;
 
     // Handed on as they are.
+    char **GetMetadataDomainList() override { return m_source.GetMetadataDomainList(); }
     const char *GetName() MESHMARK_CONST override { return m_source.GetName(); }
     OGRwkbGeometryType GetGeomType() MESHMARK_CONST override { return m_source.GetGeomType(); }
     MESHMARK_CONST OGRFeatureDefn *GetLayerDefn() MESHMARK_CONST override { return m_source.GetLayerDefn(); }
@@ -169,6 +174,7 @@ class MeshmarkLayer final : public OGRLayer
     const int m_number;
     const MeshmarkMarking *const m_marking;
     const bool m_marked;
+    CPLStringList m_nativeData;       // words of a GeoJSON file, without places
     bool m_evaluatesGeometry = false; // the attribute filter does
     bool m_readsAll = false;          // whatever the filters
     bool m_ended = false;

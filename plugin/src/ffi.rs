@@ -76,7 +76,7 @@ unsafe extern "C" fn meshmark_open(
         // SAFETY: the shim gives a C string, an option list and the address of a handle.
         let (name, options, source) = unsafe { (text(name), strings(options), &mut *source) };
         let opened = request(&options).and_then(|request| {
-            let opened = OwnedSource::open(&name)?;
+            let opened = OwnedSource::open(&name, asks_for_native_data(&options))?;
             // SAFETY: `opened` outlives the borrow.
             let marking = mark(name.clone(), &request, &unsafe { Borrowed::new(opened.handle()) })?;
             marking.write_record(&request)?;
@@ -85,6 +85,11 @@ unsafe extern "C" fn meshmark_open(
         });
         hand_over(&name, opened)
     })
+}
+
+/// `ogr2ogr` does so of every driver.
+fn asks_for_native_data(options: &[String]) -> bool {
+    options.iter().any(|option| option.eq_ignore_ascii_case("NATIVE_DATA=YES"))
 }
 
 /// Marks an open dataset.

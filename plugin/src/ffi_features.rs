@@ -28,6 +28,11 @@ impl FeatureRef<'_> {
         FeatureRef(feature, PhantomData)
     }
 
+    /// For GDAL, while this lives.
+    pub fn handle(&self) -> OGRFeatureH {
+        self.0
+    }
+
     /// Its id, when it has one.
     pub fn id(&self) -> Option<i64> {
         // SAFETY: the feature is there.

@@ -4,6 +4,7 @@ use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
     ffi_features::Feature,
+    ffi_native_data::{NATIVE_DATA, item_without_places, meshmark_native_data},
     ffi_source::{strings, text},
 };
 use gdal_sys::{
@@ -19,9 +20,6 @@ use std::{
 
 /// The configuration option for checking creation options.
 const VALIDATE: &CStr = c"GDAL_VALIDATE_CREATION_OPTIONS";
-
-/// The layer creation options by which `ogr2ogr` hands on the words of a GeoJSON file, its unmarked extent too.
-const NATIVE_WORDS: [&str; 2] = ["NATIVE_DATA", "NATIVE_MEDIA_TYPE"];
 
 /// What a layer is created with.
 pub struct LayerSpec {
@@ -41,26 +39,33 @@ impl LayerSpec {
         name: String,
         srs: OGRSpatialReferenceH,
         geometry: OGRwkbGeometryType::Type,
-        mut options: Vec<(String, String)>,
+        options: Vec<(String, String)>,
     ) -> Self {
-        options.retain(|(name, _)| !NATIVE_WORDS.iter().any(|native| native.eq_ignore_ascii_case(name)));
+        let options = options.into_iter();
+        let options = options
+            .filter_map(|(name, value)| item_without_places(&name, &value).map(|value| (name, value)))
+            .collect();
         // SAFETY: as the caller promises.
         let srs = Srs(if srs.is_null() { srs } else { unsafe { gdal_sys::OSRClone(srs) } });
         LayerSpec { name, geometry, options, srs }
     }
 
-    /// Whether coordinates are longitudes and latitudes of WGS 84, or nobody knows.
+    /// Whether x and y are longitudes and latitudes of WGS 84, or nobody knows.
     pub fn is_wgs84(&self) -> bool {
         // The order of the axes is that of the host's coordinates in any case: x is the longitude.
         let criterion = c"CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS";
         let axes = c"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES";
         let options = [criterion.as_ptr(), axes.as_ptr(), ptr::null()];
-        // SAFETY: ours is null or a reference, the other one is made and released here; the list ends in null.
+        if self.srs.0.is_null() {
+            return true;
+        }
+        // SAFETY: ours is a reference, the others are made and released here; null is no name, and the list ends in it.
         unsafe {
+            let own = Srs(gdal_sys::OSRClone(self.srs.0));
+            gdal_sys::OSRDemoteTo2D(own.0, ptr::null());
             let wgs84 = gdal_sys::OSRNewSpatialReference(ptr::null());
             gdal_sys::OSRSetWellKnownGeogCS(wgs84, c"WGS84".as_ptr());
-            let is_same =
-                self.srs.0.is_null() || gdal_sys::OSRIsSameEx(self.srs.0, wgs84, options.as_ptr()) != 0;
+            let is_same = gdal_sys::OSRIsSameEx(own.0, wgs84, options.as_ptr()) != 0;
             gdal_sys::OSRRelease(wgs84);
             is_same
         }
@@ -437,7 +442,7 @@ impl Drop for Output {
     }
 }
 
-/// But for what a GeoJSON file said of itself, its unmarked extent too.
+/// But for the unmarked extent that a GeoJSON file has in its words.
 ///
 /// # Safety
 /// Both are datasets or layers that are open.
@@ -445,10 +450,15 @@ unsafe fn copy_metadata(from: *mut std::ffi::c_void, to: *mut std::ffi::c_void) 
     // SAFETY: the list of names is ours to free, those of a domain are copied.
     unsafe {
         let domains = gdal_sys::GDALGetMetadataDomainList(from);
-        for domain in strings(domains.cast()).iter().filter(|domain| *domain != "NATIVE_DATA") {
-            let domain = c_string(domain);
+        for domain in strings(domains.cast()) {
+            let is_native = domain == NATIVE_DATA;
+            let domain = c_string(&domain);
             let items = gdal_sys::GDALGetMetadata(from, domain.as_ptr());
-            if !items.is_null() && !(*items).is_null() {
+            if is_native {
+                let items = meshmark_native_data(items.cast_const().cast());
+                gdal_sys::GDALSetMetadata(to, items, domain.as_ptr());
+                gdal_sys::CSLDestroy(items);
+            } else if !items.is_null() && !(*items).is_null() {
                 gdal_sys::GDALSetMetadata(to, items.cast(), domain.as_ptr());
             }
         }

@@ -30,8 +30,9 @@ const DRIVER: &CStr = c"MESHMARK";
 pub struct OwnedSource(GDALDatasetH);
 
 impl OwnedSource {
-    /// Opens a vector dataset to read. What GDAL says meanwhile is emitted only when it succeeds.
-    pub fn open(name: &str) -> Result<Self> {
+    /// Opens a vector dataset to read, with the words of a GeoJSON file when `with_native_data`. What GDAL says
+    /// meanwhile is emitted only when it succeeds.
+    pub fn open(name: &str, with_native_data: bool) -> Result<Self> {
         if name.trim().is_empty() {
             return Err(Error::NoSource);
         }
@@ -44,7 +45,9 @@ impl OwnedSource {
         let flags = GdalOpenFlags::GDAL_OF_VECTOR
             | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR
             | GdalOpenFlags::GDAL_OF_INTERNAL;
-        let options = OPEN_OPTIONS.map(|option| CString::new(option).expect("it has no NUL"));
+        let native = with_native_data.then_some("@NATIVE_DATA=YES");
+        let options = OPEN_OPTIONS.into_iter().chain(native);
+        let options: Vec<CString> = options.map(|o| CString::new(o).expect("it has no NUL")).collect();
         let options: Vec<_> = options.iter().map(|option| option.as_ptr()).chain([ptr::null()]).collect();
         // SAFETY: the name is a C string; null lists mean all drivers and no sibling files, the options end in null.
         let handle = unsafe {

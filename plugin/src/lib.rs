@@ -19,6 +19,7 @@ mod error;
 mod ffi;
 mod ffi_errors;
 mod ffi_features;
+mod ffi_native_data;
 mod ffi_output;
 mod ffi_source;
 mod ffi_writer;

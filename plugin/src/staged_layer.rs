@@ -10,11 +10,13 @@ use crate::{
     ffi_output::{Field, LayerSpec, Output},
     ffi_source::View,
 };
-use meshmark_dataset::geopackage::safe_layer_name;
+use meshmark_dataset::{formats::Format, geopackage::safe_layer_name};
 use std::ffi::CString;
 
 /// The column for the styles of features.
 const STYLE_COLUMN: &str = "OGR_STYLE";
+/// The column for the words of features from a GeoJSON file.
+const NATIVE_COLUMN: &str = "OGR_NATIVE";
 /// The column for what a GeoPackage would not give back.
 const LOST_COLUMN: &str = "OGR_VALUES";
 
@@ -27,6 +29,8 @@ pub struct StagedLayer {
     number: usize,
     /// Whether it ends as it is staged.
     is_geopackage: bool,
+    /// Whether it ends as GeoJSON.
+    is_json: bool,
     fields: Vec<Field>,
     /// For every field of the layer, the one of the staging GeoPackage.
     columns: Vec<Option<usize>>,
@@ -35,6 +39,7 @@ pub struct StagedLayer {
     /// Names in the staging GeoPackage, lower case.
     taken: Vec<String>,
     style_column: Option<usize>,
+    native_column: Option<usize>,
     lost_column: Option<usize>,
     /// How many features came before the first one that the host numbered.
     before_ids: Option<usize>,
@@ -63,7 +68,7 @@ impl StagedLayer {
         number: usize,
         schema: &Output,
         staged: &mut Output,
-        is_geopackage: bool,
+        format: &Format,
     ) -> Result<Self> {
         let [_, id, geometry] = schema.names(number);
         let or = |name: String, default: &str| if name.is_empty() { default.into() } else { name };
@@ -72,23 +77,24 @@ impl StagedLayer {
         let options = [("FID", &id), ("GEOMETRY_NAME", &geometry), ("SPATIAL_INDEX", &"NO".to_string())];
         let options = options.map(|(name, value)| (name.to_string(), value.clone()));
         staged.add_layer(&spec.renamed(name.clone(), options.into()), true)?;
-        let taken = [&id, &geometry, STYLE_COLUMN, LOST_COLUMN].map(str::to_lowercase).into();
+        let taken = [&id, &geometry, STYLE_COLUMN, NATIVE_COLUMN, LOST_COLUMN].map(str::to_lowercase).into();
         let (fields, columns, lists) = (Vec::new(), Vec::new(), Vec::new());
-        let (style_column, lost_column, before_ids, last_id, features) = (None, None, None, 0, 0);
         Ok(StagedLayer {
             spec,
             name,
             number,
-            is_geopackage,
+            is_geopackage: format.driver == "GPKG",
+            is_json: format.has_native_data(),
             fields,
             columns,
             lists,
             taken,
-            style_column,
-            lost_column,
-            before_ids,
-            last_id,
-            features,
+            style_column: None,
+            native_column: None,
+            lost_column: None,
+            before_ids: None,
+            last_id: 0,
+            features: 0,
         })
     }
 
@@ -115,6 +121,7 @@ impl StagedLayer {
     /// Stages a feature; its id.
     pub fn write(&mut self, staged: &Output, feature: FeatureRef) -> Result<i64> {
         let style = feature.style();
+        let native = feature.native_data().filter(|_| self.is_json);
         let id = feature.id();
         if id.is_some() {
             self.before_ids.get_or_insert(self.features);
@@ -126,18 +133,25 @@ impl StagedLayer {
             None if self.before_ids.is_some() && !self.is_geopackage => lost.push(Lost::Id(NULL_ID)),
             _ => {}
         }
-        if style.is_some() && self.style_column.is_none() {
-            self.style_column = Some(staged.field_count(self.number));
-            staged.add_field(self.number, &Field::text(STYLE_COLUMN.into()), false, true)?;
-        }
-        if !lost.is_empty() && self.lost_column.is_none() {
-            self.lost_column = Some(staged.field_count(self.number));
-            staged.add_field(self.number, &Field::text(LOST_COLUMN.into()), false, true)?;
+        let number = self.number;
+        let own = [
+            (style.is_some(), &mut self.style_column, STYLE_COLUMN),
+            (native.is_some(), &mut self.native_column, NATIVE_COLUMN),
+            (!lost.is_empty(), &mut self.lost_column, LOST_COLUMN),
+        ];
+        for (is_needed, column, name) in own {
+            if is_needed && column.is_none() {
+                *column = Some(staged.field_count(number));
+                staged.add_field(number, &Field::text(name.into()), false, true)?;
+            }
         }
         let copy = staged.feature(self.number);
         copy.copy_from(feature, &self.columns, &self.lists)?;
         if let Some((column, style)) = self.style_column.zip(style) {
             copy.set_text(column, &style);
+        }
+        if let Some((column, native)) = self.native_column.zip(native) {
+            copy.set_c_text(column, &native);
         }
         for lost in &lost {
             if let Lost::Text(field, _) = *lost {
@@ -186,6 +200,10 @@ impl StagedLayer {
             if let Some(column) = self.style_column {
                 feature.set_style(&marked.borrow().text(column));
             }
+            let native = self.native_column.map(|column| marked.borrow().bytes(column)).unwrap_or_default();
+            if let Some(native) = CString::new(native).ok().filter(|native| !native.is_empty()) {
+                feature.set_native_data(&native);
+            }
             let has_id = self.before_ids.is_some_and(|before| self.is_geopackage || written >= before);
             if let Some(id) = marked.borrow().id().filter(|_| has_id) {
                 feature.set_id(id);
@@ -206,7 +224,7 @@ impl StagedLayer {
 
     /// For every column of the staging GeoPackage, the field of the layer.
     fn fields_of_columns(&self) -> Vec<Option<usize>> {
-        let own = [self.style_column, self.lost_column];
+        let own = [self.style_column, self.native_column, self.lost_column];
         let last = self.columns.iter().chain(&own).flatten().max();
         let mut fields = vec![None; last.map_or(0, |last| last + 1)];
         for (field, column) in self.columns.iter().enumerate() {

@@ -77,8 +77,7 @@ impl Writer {
             }
             writer.schema.add_layer(&spec, false)?;
             let number = writer.layers.len();
-            let is_geopackage = writer.is_geopackage();
-            let layer = StagedLayer::new(spec, number, &writer.schema, &mut writer.staged, is_geopackage)?;
+            let layer = StagedLayer::new(spec, number, &writer.schema, &mut writer.staged, format)?;
             writer.layers.push(layer);
             let fields = writer.schema.fields(number);
             fields.iter().try_for_each(|field| writer.stage_field(number, field, &field.name))?;
@@ -99,10 +98,6 @@ impl Writer {
 
     fn stage_field(&mut self, layer: usize, field: &Field, name: &str) -> Result<()> {
         self.layers[layer].add_field(&self.staged, field, name)
-    }
-
-    fn is_geopackage(&self) -> bool {
-        self.target.format.driver == "GPKG"
     }
 
     /// Stages a feature and gives it its id.
@@ -164,7 +159,7 @@ impl Writer {
         (0..layers.len()).for_each(|layer| staged.describe_layer(layer, described));
         staged.commit()?;
         staged.close()?;
-        let source = OwnedSource::open(&places.staged.display().to_string())?;
+        let source = OwnedSource::open(&places.staged.display().to_string(), false)?;
         let marking = mark(&request, &source)?;
         let view = View::new(source, marking)?;
         let folder = places.main.subfolder("out")?;

@@ -248,6 +248,7 @@ fn geojson(host: &Host, random: &mut ChaCha20Rng) -> Source {
     let names = choices(random, FIELD_NAMES, 5);
     let kinds: Vec<usize> = names.iter().map(|_| below(random, 10)).collect();
     let (ids, without_place) = (below(random, 4), below(random, 6) == 0);
+    let (heights, foreign) = (below(random, 6), below(random, 2) == 0);
     let mut features = Vec::new();
     for number in 0..HOUSES {
         let mut properties = Map::from_iter([("nr".to_string(), json!(number))]);
@@ -259,8 +260,19 @@ fn geojson(host: &Host, random: &mut ChaCha20Rng) -> Source {
                 _ => drop(properties.insert(name.to_string(), value)),
             }
         }
+        let ring = house(number, random).into_iter().map(|[x, y]| match heights {
+            0 => json!([x, y, number, 0.5]),
+            1 => json!([x, y, number]),
+            _ => json!([x, y]),
+        });
         let mut feature = json!({"type": "Feature", "properties": properties,
-            "geometry": {"type": "Polygon", "coordinates": [house(number, random)]}});
+            "geometry": {"type": "Polygon", "coordinates": [ring.collect::<Vec<_>>()]}});
+        if foreign && number % 3 == 0 {
+            feature["bbox"] = json!([0, 0, 1, 1]);
+            feature["title"] = json!({"bbox": [number], "coordinates": ["käsi", "\"geometry\": {"]});
+            feature["geometry"]["more"] = json!([number, {"coordinates": [number, 2]}]);
+            feature["geometry"]["bbox"] = json!([0, 0, 1, 1]);
+        }
         match ids {
             0 => feature["id"] = json!(1000 - number),
             1 => feature["id"] = json!(format!("way/{number}")),
@@ -272,10 +284,15 @@ fn geojson(host: &Host, random: &mut ChaCha20Rng) -> Source {
         }
         features.push(feature);
     }
-    let text = json!({"type": "FeatureCollection", "name": layer, "features": features}).to_string();
-    fs::write(host.path("table.geojson"), text).unwrap();
+    let mut all = json!({"type": "FeatureCollection", "name": layer, "features": features});
+    if foreign {
+        all["bbox"] = json!([0, 0, 1, 1]);
+        all["licence <1>"] = json!({"bbox": [1, 2], "by": "a & \"b\""});
+    }
+    fs::write(host.path("table.geojson"), all.to_string()).unwrap();
     let what = format!(
-        "a GeoJSON file {layer:?} with {names:?} of kinds {kinds:?}, ids {ids}, no place {without_place}"
+        "a GeoJSON file {layer:?} with {names:?} of kinds {kinds:?}, ids {ids}, no place {without_place}, heights \
+         {heights}, foreign members {foreign}"
     );
     Source { path: "table.geojson".into(), what }
 }

@@ -1,24 +1,27 @@
-//! GeoJSON as GDAL writes it, a feature a line and its geometry last: the lines of one file with the geometries of
-//! another.
+//! GeoJSON as GDAL writes it, a feature a line: the lines of one file with the positions of another.
 
 use super::plain::changed;
 use crate::Result;
-use meshmark_dataset::workplace::file_error;
+use meshmark_dataset::{
+    geojson_text::{Place, numbers, places},
+    workplace::file_error,
+};
 use std::{
     fs::File,
     io::{self, BufRead, BufReader, BufWriter, ErrorKind, Write},
     path::Path,
 };
 
-/// What a geometry comes after. It stands in no text, where quotes have backslashes before them, and in no geometry.
-const MEMBER: &[u8] = b"\"geometry\":";
+/// What the bounding box of a collection comes after, in a line of its own.
+const BOX_OF_ALL: &[u8] = b"\"bbox\":";
 
-/// Writes `file`: all of `plain`, but for its geometries, which are those of the same features of `geometries`.
-pub fn write(plain: &Path, geometries: &Path, file: &Path) -> Result<()> {
+/// Writes `file`: all of `plain`, but for x and y of its positions, which are those of the same features of `marked`, and
+/// for its bounding boxes.
+pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
     let open =
         |path| File::open(path).map(BufReader::new).map_err(|error| file_error("reading", path, error));
-    let (plain, geometries) = (open(plain)?, open(geometries)?);
-    let written = File::create(file).and_then(|to| join(plain, geometries, BufWriter::new(to)));
+    let (plain, marked) = (open(plain)?, open(marked)?);
+    let written = File::create(file).and_then(|to| join(plain, marked, BufWriter::new(to)));
     match written {
         Err(error) if error.kind() == ErrorKind::InvalidData => Err(changed()),
         Err(error) => Err(file_error("writing", file, error).into()),
@@ -26,24 +29,24 @@ pub fn write(plain: &Path, geometries: &Path, file: &Path) -> Result<()> {
     }
 }
 
-fn join(mut plain: impl BufRead, mut geometries: impl BufRead, mut to: impl Write) -> io::Result<()> {
+fn join(mut plain: impl BufRead, mut marked: impl BufRead, mut to: impl Write) -> io::Result<()> {
     let (mut line, mut other) = (Vec::new(), Vec::new());
     while next(&mut plain, &mut line)? {
-        let Some(place) = place(&line) else {
+        let is_box = line.starts_with(BOX_OF_ALL);
+        if !is_box && !is_feature(&line) {
             to.write_all(&line)?;
             continue;
+        }
+        let is_wanted = |line: &[u8]| is_feature(line) || is_box && line.starts_with(BOX_OF_ALL);
+        while next(&mut marked, &mut other)? && !is_wanted(&other) {}
+        let joined = match is_box {
+            false => feature(&line, &other),
+            true => other.starts_with(BOX_OF_ALL).then(|| other.clone()),
         };
-        while next(&mut geometries, &mut other)? && self::place(&other).is_none() {}
-        let Some(from) = self::place(&other) else { return Err(ErrorKind::InvalidData.into()) };
-        to.write_all(&line[..place])?;
-        let geometry = other[from..].trim_ascii_end();
-        to.write_all(geometry.strip_suffix(b",").unwrap_or(geometry))?;
-        to.write_all(
-            &line[line.trim_ascii_end().strip_suffix(b",").unwrap_or(line.trim_ascii_end()).len()..],
-        )?;
+        to.write_all(&joined.ok_or(ErrorKind::InvalidData)?)?;
     }
-    while next(&mut geometries, &mut other)? {
-        if self::place(&other).is_some() {
+    while next(&mut marked, &mut other)? {
+        if is_feature(&other) {
             return Err(ErrorKind::InvalidData.into());
         }
     }
@@ -56,34 +59,88 @@ fn next(from: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
     Ok(from.read_until(b'\n', line)? > 0)
 }
 
-/// Where in a line the geometry of a feature begins.
-fn place(line: &[u8]) -> Option<usize> {
-    let start = line.windows(MEMBER.len()).rposition(|bytes| bytes == MEMBER)?;
-    Some(start + MEMBER.len())
+/// The members of a collection begin with a quote, and it ends with a bracket.
+fn is_feature(line: &[u8]) -> bool {
+    line.starts_with(b"{ ")
+}
+
+/// The line of a feature with the positions of another one; none when they do not belong together.
+fn feature(line: &[u8], marked: &[u8]) -> Option<Vec<u8>> {
+    let of_place = |place| match place {
+        Place::Position(range) => Some(numbers(&marked[range]).collect()),
+        Place::BoundingBox(_) => None,
+    };
+    let positions: Vec<Vec<&[u8]>> = places(marked)?.into_iter().filter_map(of_place).collect();
+    let mut rest = positions.iter();
+    let (mut joined, mut at) = (Vec::with_capacity(line.len()), 0);
+    for place in places(line)? {
+        let (Place::Position(range) | Place::BoundingBox(range)) = &place;
+        joined.extend(&line[at..range.start]);
+        at = range.end;
+        let list: Vec<&[u8]> = numbers(&line[range.clone()]).collect();
+        let list = match place {
+            Place::Position(_) => {
+                let position = rest.next()?;
+                position.iter().chain(list.get(position.len()..)?).copied().collect()
+            }
+            Place::BoundingBox(_) => bounding_box(list, &positions)?,
+        };
+        joined.extend([b"[ ", list.join(&b", "[..]).as_slice(), b" ]"].concat());
+    }
+    joined.extend(&line[at..]);
+    rest.next().is_none().then_some(joined)
+}
+
+/// A bounding box in which least and largest x and y are those of the positions.
+fn bounding_box<'a>(mut list: Vec<&'a [u8]>, positions: &[Vec<&'a [u8]>]) -> Option<Vec<&'a [u8]>> {
+    let half = list.len() / 2;
+    if half < 2 {
+        return None;
+    }
+    for axis in [0, 1] {
+        let value = |number: &&[u8]| str::from_utf8(number).ok()?.parse::<f64>().ok();
+        let along = positions.iter().filter_map(|position| position.get(axis).copied());
+        let mut along: Vec<(f64, &[u8])> =
+            along.map(|number| Some((value(&number)?, number))).collect::<Option<_>>()?;
+        along.sort_by(|a, b| a.0.total_cmp(&b.0));
+        list[axis] = along.first()?.1;
+        list[half + axis] = along.last()?.1;
+    }
+    Some(list)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn joined(plain: &str, geometries: &str) -> io::Result<String> {
+    fn joined(plain: &str, marked: &str) -> io::Result<String> {
         let mut to = Vec::new();
-        join(plain.as_bytes(), geometries.as_bytes(), &mut to)?;
+        join(plain.as_bytes(), marked.as_bytes(), &mut to)?;
         Ok(String::from_utf8(to).unwrap())
     }
 
     #[test]
-    fn geometries_change_and_nothing_else() {
-        let plain = "{\n\"name\": \"\\\"geometry\\\": {\",\n\"features\": [\n{ \"properties\": { \"geometry\": 1 }, \
-                     \"geometry\": { \"x\": 1 } },\n{ \"id\": 7, \"geometry\": null }\n]\n}\n";
-        let geometries =
-            "{\n\"features\": [\n{ \"geometry\": { \"x\": 20 } },\n{ \"geometry\": null }\n]\n}\n";
-        assert_eq!(joined(plain, geometries).unwrap(), plain.replace("\"x\": 1 ", "\"x\": 20 "));
+    fn positions_and_bounding_boxes_change_and_nothing_else() {
+        let plain = "{\n\"name\": \"\\\"geometry\\\": {\",\n\"bbox\": [ 1, 2, 3, 4 ],\n\"features\": [\n\
+                     { \"properties\": { \"coordinates\": [ 1, 2 ] }, \"bbox\": [ 1, 2, 0, 3, 4, 0 ], \"geometry\": \
+                     { \"coordinates\": [ [ 1, 2, 0, 9 ], [ 3, 4, 0, 8 ] ], \"more\": [ 1, 2 ] } },\n\
+                     { \"id\": 7, \"geometry\": null }\n]\n}\n";
+        let marked = "{\n\"bbox\": [ 5, 6, 7, 8 ],\n\"features\": [\n\
+                      { \"bbox\": [ 5, 6, 7, 8 ], \"geometry\": { \"coordinates\": [ [ 7, 6, 0 ], [ 5, 8, 0 ] ] } },\n\
+                      { \"geometry\": null }\n]\n}\n";
+        let expected = plain
+            .replace("[ 1, 2, 3, 4 ]", "[ 5, 6, 7, 8 ]")
+            .replace("[ 1, 2, 0, 3, 4, 0 ]", "[ 5, 6, 0, 7, 8, 0 ]")
+            .replace("[ 1, 2, 0, 9 ], [ 3, 4, 0, 8 ]", "[ 7, 6, 0, 9 ], [ 5, 8, 0, 8 ]");
+        assert_eq!(joined(plain, marked).unwrap(), expected);
     }
 
     #[test]
-    fn another_number_of_features_is_an_error() {
-        let [one, two] = [1, 2].map(|count| "{ \"geometry\": null }\n".repeat(count));
+    fn other_features_are_an_error() {
+        let line = |positions: &str| format!("{{ \"geometry\": {{ \"coordinates\": [ {positions} ] }} }}\n");
+        let [one, two] = ["[ 1, 2 ]", "[ 1, 2 ], [ 3, 4 ]"].map(line);
         assert!(joined(&one, &two).is_err() && joined(&two, &one).is_err() && joined(&two, &two).is_ok());
+        let twice = one.repeat(2);
+        assert!(joined(&one, &twice).is_err() && joined(&twice, &one).is_err());
     }
 }

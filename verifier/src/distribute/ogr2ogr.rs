@@ -12,9 +12,8 @@ use std::{
 /// Copies a dataset to a new one of this format; what `ogr2ogr` warned of.
 pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Vec<String>> {
     let mut command = Command::new("ogr2ogr");
-    // A GeoJSON file may say in its own words what extent it had.
     command
-        .args(["-f", format, "-noNativeData"])
+        .args(["-f", format])
         .args(marking::OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]))
         .args(options)
         .arg(named(to))

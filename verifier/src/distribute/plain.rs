@@ -42,7 +42,8 @@ impl Plain {
         moving::write(staged, &marked, moves.to)?;
         let (part, is_json) = (work.join("geometries"), self.driver != "ESRI Shapefile");
         let part = part.with_extension(self.path.extension().expect("it was given one"));
-        let warnings = ogr2ogr::copy(self.driver, &marked, &part, &[])?;
+        let options = if self.driver == "GeoJSON" { &["-lco", "WRITE_BBOX=YES"][..] } else { &[] };
+        let warnings = ogr2ogr::copy(self.driver, &marked, &part, options)?;
         match is_json {
             true => geojson::write(&self.path, &part, file)?,
             false => self.write_shapefile(&part, file)?,

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use meshmark_core::vertices::VertexTable;
-use meshmark_dataset::{geopackage, marking::NotMoved};
+use meshmark_dataset::{geojson_text::without_places, geopackage, marking::NotMoved};
 use rusqlite::{Connection, OpenFlags};
 use std::{
     error,
@@ -46,7 +46,7 @@ impl Staged {
             let names = names.into_iter().filter(|(name, _)| marked(name));
             names.map(|(name, column)| Layer::read(&connection, name, column, vertices)).collect()
         };
-        match forget_native_data(&path).and_then(|()| layers()) {
+        match clear_native_data(&path).and_then(|()| layers()) {
             Ok(layers) => Ok(Staged { layers, path }),
             Err(error) => Err(Error::Unreadable(format!("the map as a GeoPackage cannot be read: {error}"))),
         }
@@ -90,10 +90,11 @@ impl Layer {
     }
 }
 
-/// What a GeoJSON file said of itself came with the map, its unmarked extent too.
-fn forget_native_data(path: &Path) -> Done<()> {
-    const BEGIN: &str = "<Metadata domain=\"NATIVE_DATA\">";
-    const END: &str = "</Metadata>";
+/// The words of a GeoJSON file came with the map, and with them its unmarked extent.
+fn clear_native_data(path: &Path) -> Done<()> {
+    const BEGIN: &str = "<MDI key=\"NATIVE_DATA\">";
+    const END: &str = "</MDI>";
+    const ESCAPES: [(&str, &str); 4] = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&amp;", "&")];
     let connection = open(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
     if !connection.table_exists(None, "gpkg_metadata")? {
         return Ok(());
@@ -103,9 +104,12 @@ fn forget_native_data(path: &Path) -> Done<()> {
     for text in texts.collect::<rusqlite::Result<Vec<(i64, String)>>>()? {
         let (id, text) = text;
         let Some((before, rest)) = text.split_once(BEGIN) else { continue };
-        let after = rest.split_once(END).map_or("", |(_, after)| after);
+        let (words, after) = rest.split_once(END).unwrap_or((rest, ""));
+        let words = ESCAPES.iter().fold(words.to_string(), |words, (name, sign)| words.replace(name, sign));
+        let kept = String::from_utf8(without_places(words.as_bytes()).unwrap_or_default())?;
+        let kept = ESCAPES.iter().rev().fold(kept, |kept, (name, sign)| kept.replace(sign, name));
         let update = "UPDATE gpkg_metadata SET metadata = ?2 WHERE id = ?1";
-        connection.execute(update, (id, format!("{before}{after}")))?;
+        connection.execute(update, (id, format!("{before}{BEGIN}{kept}{END}{after}")))?;
     }
     Ok(())
 }

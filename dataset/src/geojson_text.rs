@@ -1,0 +1,287 @@
+//! The text of GeoJSON: where in it positions and bounding boxes stand, so that they can be replaced and all else stays as
+//! it is written. GDAL keeps the text of a GeoJSON file as *native data*, and writes from it what its own model of
+//! features does not hold: ids, foreign members, a fourth ordinate (RFC 7946).
+//!
+//! The text may hold NaN, which a parser of JSON refuses, so it is walked here; GDAL has parsed it before.
+
+use std::ops::Range;
+
+/// What GDAL calls native data that is GeoJSON.
+pub const MEDIA_TYPE: &str = "application/vnd.geo+json";
+
+/// A part of a text, as a range of its bytes.
+#[derive(Debug, PartialEq)]
+pub enum Place {
+    /// `[ x, y, … ]`.
+    Position(Range<usize>),
+    /// Of a geometry, a feature or a collection.
+    BoundingBox(Range<usize>),
+}
+
+/// Where the positions and bounding boxes of a feature or a collection stand, in the order of the text. None when it is
+/// no object.
+pub fn places(text: &[u8]) -> Option<Vec<Place>> {
+    let mut places = Vec::new();
+    for (key, value) in Text(text).members(0..text.len())? {
+        match key {
+            b"bbox" => places.push(Place::BoundingBox(value)),
+            b"geometry" => Text(text).places_of_geometry(value, &mut places)?,
+            _ => {}
+        }
+    }
+    Some(places)
+}
+
+/// The native data of a feature or a collection without what its features hold themselves, and hold otherwise once they
+/// are marked: attributes, bounding boxes, and positions but for ordinates after the third. Where there was a bounding
+/// box, GDAL makes a new one. None when nothing is left that GDAL would write.
+///
+/// ```
+/// # use meshmark_dataset::geojson_text::without_places;
+/// let feature = br#"{"type": "Feature", "id": 7, "bbox": [1, 2, 1, 2], "properties": {"a": 1},
+///                    "geometry": {"type": "Point", "coordinates": [1, 2]}}"#;
+/// assert_eq!(without_places(feature).unwrap(), br#"{"id":7,"bbox":null,"properties":{}}"#);
+/// assert_eq!(without_places(br#"{"type": "Feature", "properties": {"a": 1}}"#), None);
+/// ```
+pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
+    let all = Text(text);
+    let members = all.members(0..text.len())?;
+    let has_properties =
+        members.iter().any(|(key, value)| *key == b"properties" && text[value.start] == b'{');
+    let mut kept = Vec::new();
+    for (key, value) in members {
+        let value = match key {
+            b"type" | b"properties" => continue,
+            b"bbox" => b"null".into(),
+            b"geometry" if all.says_more(&value)? => all.without_places_of_geometry(value)?,
+            b"geometry" => continue,
+            _ => text[value].to_vec(),
+        };
+        kept.push([b"\"", key, b"\":", &value].concat());
+    }
+    if kept.is_empty() {
+        return None;
+    }
+    if has_properties {
+        kept.push(b"\"properties\":{}".into());
+    }
+    Some([b"{".as_slice(), &kept.join(&b','), b"}"].concat())
+}
+
+/// The numbers of a position or a bounding box, as they are written.
+pub fn numbers(list: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let inside = list.strip_prefix(b"[").and_then(|list| list.strip_suffix(b"]")).unwrap_or_default();
+    inside.split(|byte| *byte == b',').map(<[u8]>::trim_ascii).filter(|number| !number.is_empty())
+}
+
+/// JSON; ranges are of values, without blanks around them.
+struct Text<'a>(&'a [u8]);
+
+impl<'a> Text<'a> {
+    /// Keys and values of an object.
+    fn members(&self, object: Range<usize>) -> Option<Vec<(&'a [u8], Range<usize>)>> {
+        let mut members = Vec::new();
+        let mut at = self.enter(object, b'{')?;
+        while self.0.get(at)? != &b'}' {
+            let key = at..self.end_of(at)?;
+            let colon = self.skip_blanks(key.end);
+            let value = self.skip_blanks(colon + 1);
+            let value = value..self.end_of(value)?;
+            at = self.next(value.end);
+            members.push((self.0.get(key.start + 1..key.end - 1)?, value));
+        }
+        Some(members)
+    }
+
+    /// The values of an array.
+    fn elements(&self, array: Range<usize>) -> Option<Vec<Range<usize>>> {
+        let mut elements = Vec::new();
+        let mut at = self.enter(array, b'[')?;
+        while self.0.get(at)? != &b']' {
+            let element = at..self.end_of(at)?;
+            at = self.next(element.end);
+            elements.push(element);
+        }
+        Some(elements)
+    }
+
+    /// Where the first value inside begins.
+    fn enter(&self, value: Range<usize>, bracket: u8) -> Option<usize> {
+        let start = self.skip_blanks(value.start);
+        (*self.0.get(start)? == bracket).then(|| self.skip_blanks(start + 1))
+    }
+
+    fn skip_blanks(&self, at: usize) -> usize {
+        at + self.0[at.min(self.0.len())..].iter().take_while(|byte| byte.is_ascii_whitespace()).count()
+    }
+
+    /// Where the next value of an object or an array begins, or its end is.
+    fn next(&self, at: usize) -> usize {
+        let at = self.skip_blanks(at);
+        if self.0.get(at) == Some(&b',') { self.skip_blanks(at + 1) } else { at }
+    }
+
+    /// Where the value ends that begins here.
+    fn end_of(&self, start: usize) -> Option<usize> {
+        let (mut at, mut depth, mut in_text) = (start, 0_usize, false);
+        loop {
+            let byte = *self.0.get(at)?;
+            match byte {
+                b'\\' if in_text => at += 1,
+                b'"' => in_text = !in_text,
+                _ if in_text => {}
+                b'{' | b'[' => depth += 1,
+                b'}' | b']' if depth > 0 => depth -= 1,
+                b'}' | b']' | b',' | b':' if depth == 0 => return (at > start).then_some(at),
+                _ if depth == 0 && byte.is_ascii_whitespace() => return Some(at),
+                _ => {}
+            }
+            at += 1;
+            if depth == 0 && !in_text && matches!(byte, b'"' | b'}' | b']') {
+                return Some(at);
+            }
+        }
+    }
+
+    fn is(&self, value: &Range<usize>, bracket: u8) -> bool {
+        self.0[value.start] == bracket
+    }
+
+    fn places_of_geometry(&self, geometry: Range<usize>, places: &mut Vec<Place>) -> Option<()> {
+        if !self.is(&geometry, b'{') {
+            return Some(());
+        }
+        for (key, value) in self.members(geometry)? {
+            match key {
+                b"bbox" => places.push(Place::BoundingBox(value)),
+                b"coordinates" => self.positions(value, places)?,
+                b"geometries" if self.is(&value, b'[') => {
+                    for geometry in self.elements(value)? {
+                        self.places_of_geometry(geometry, places)?;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Some(())
+    }
+
+    fn positions(&self, coordinates: Range<usize>, places: &mut Vec<Place>) -> Option<()> {
+        if !self.is(&coordinates, b'[') {
+            return Some(());
+        }
+        let elements = self.elements(coordinates.clone())?;
+        match elements.first() {
+            Some(first) if !self.is(first, b'[') => places.push(Place::Position(coordinates)),
+            _ => elements.into_iter().try_for_each(|element| self.positions(element, places))?,
+        }
+        Some(())
+    }
+
+    /// Whether a geometry has what GDAL's model does not hold.
+    fn says_more(&self, geometry: &Range<usize>) -> Option<bool> {
+        if !self.is(geometry, b'{') {
+            return Some(false);
+        }
+        for (key, value) in self.members(geometry.clone())? {
+            let says_more = match key {
+                b"type" | b"bbox" => false,
+                b"coordinates" => self.has_fourth_ordinate(value)?,
+                b"geometries" if self.is(&value, b'[') => {
+                    let each = self.elements(value)?.into_iter().map(|geometry| self.says_more(&geometry));
+                    each.collect::<Option<Vec<bool>>>()?.contains(&true)
+                }
+                _ => true,
+            };
+            if says_more {
+                return Some(true);
+            }
+        }
+        Some(false)
+    }
+
+    fn has_fourth_ordinate(&self, coordinates: Range<usize>) -> Option<bool> {
+        let mut places = Vec::new();
+        self.positions(coordinates, &mut places)?;
+        let has =
+            |place: &Place| matches!(place, Place::Position(at) if numbers(&self.0[at.clone()]).count() > 3);
+        Some(places.iter().any(has))
+    }
+
+    fn without_places_of_geometry(&self, geometry: Range<usize>) -> Option<Vec<u8>> {
+        let (mut places, mut text, mut at) = (Vec::new(), Vec::new(), geometry.start);
+        self.places_of_geometry(geometry.clone(), &mut places)?;
+        for place in places {
+            let (Place::Position(range) | Place::BoundingBox(range)) = &place;
+            text.extend(&self.0[at..range.start]);
+            at = range.end;
+            match place {
+                Place::BoundingBox(_) => text.extend(b"null"),
+                Place::Position(range) => {
+                    let zeroed = |(i, number)| if i < 3 { b"0".as_slice() } else { number };
+                    let ordinates: Vec<&[u8]> = numbers(&self.0[range]).enumerate().map(zeroed).collect();
+                    text.extend([b"[".as_slice(), &ordinates.join(&b','), b"]"].concat());
+                }
+            }
+        }
+        text.extend(&self.0[at..geometry.end]);
+        Some(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(text: &str) -> Option<String> {
+        without_places(text.as_bytes()).map(|text| String::from_utf8(text).unwrap())
+    }
+
+    #[test]
+    fn what_features_hold_themselves_is_left_out_and_all_else_stays() {
+        let cases = [
+            (r#"{ "id": "a\"]}, b", "properties": null, "n": NaN }"#, Some(r#"{"id":"a\"]}, b","n":NaN}"#)),
+            (
+                r#"{ "name": "x", "bbox": [ 1, 2 ], "more": { "bbox": [ 3, 4 ] } }"#,
+                Some(r#"{"name":"x","bbox":null,"more":{ "bbox": [ 3, 4 ] }}"#),
+            ),
+            (
+                r#"{"properties":{"a":NaN},"geometry":{"type":"LineString","bbox":[1,2,3,4],"coordinates":[[1,2,3],[4,5]]}}"#,
+                None,
+            ),
+            (
+                r#"{"geometry":{"type":"MultiPoint","coordinates":[[1.5,2,3,4e5,-6],[7,8,9,1]]},"properties":{}}"#,
+                Some(
+                    r#"{"geometry":{"type":"MultiPoint","coordinates":[[0,0,0,4e5,-6],[0,0,0,1]]},"properties":{}}"#,
+                ),
+            ),
+            (
+                r#"{"geometry":{"geometries":[{"coordinates":[1,2],"bbox":[1,2,1,2],"a":[1,2]},{"coordinates":[]}]}}"#,
+                Some(
+                    r#"{"geometry":{"geometries":[{"coordinates":[0,0],"bbox":null,"a":[1,2]},{"coordinates":[]}]}}"#,
+                ),
+            ),
+            (r#"{"geometry":null}"#, None),
+            ("{}", None),
+            (" { } ", None),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(kept(text).as_deref(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_cut_short_has_no_places() {
+        let text =
+            r#"{"id":1,"bbox":[1,2,3,4],"geometry":{"type":"Point","coordinates":[1,2,3,4],"a":"\\"}}"#;
+        assert!(kept(text).is_some());
+        for end in 0..text.len() {
+            assert_eq!(
+                (kept(&text[..end]), places(&text.as_bytes()[..end])),
+                (None, None),
+                "{}",
+                &text[..end]
+            );
+        }
+    }
+}

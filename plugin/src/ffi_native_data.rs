@@ -1,0 +1,85 @@
+//! GDAL's native data, the words of a GeoJSON file: handed on without what they say of unmarked places.
+
+use crate::{
+    ffi_errors::guarded,
+    ffi_features::{Feature, FeatureRef},
+    ffi_output::c_string,
+    ffi_source::{strings, text},
+};
+use gdal_sys::OGRFeatureH;
+use meshmark_dataset::geojson_text::{MEDIA_TYPE, without_places};
+use std::{
+    ffi::{CStr, CString, c_char},
+    ptr,
+};
+
+/// The metadata domain of a layer, and the name of the item and of the layer creation option that hold the words.
+pub const NATIVE_DATA: &str = "NATIVE_DATA";
+
+/// A NAME=VALUE pair of a layer's native data, without places; none when nothing is left.
+pub fn item_without_places(name: &str, value: &str) -> Option<String> {
+    if !name.eq_ignore_ascii_case(NATIVE_DATA) {
+        return Some(value.into());
+    }
+    without_places(value.as_bytes()).map(|kept| String::from_utf8(kept).expect("only ASCII was left out"))
+}
+
+impl FeatureRef<'_> {
+    /// Its native data without places; none when there is nothing left.
+    pub fn native_data(&self) -> Option<CString> {
+        // SAFETY: the feature is there; both texts are null or C strings, and are copied.
+        let data = unsafe {
+            let (data, kind) = (
+                gdal_sys::OGR_F_GetNativeData(self.handle()),
+                gdal_sys::OGR_F_GetNativeMediaType(self.handle()),
+            );
+            if data.is_null() || !text(kind).eq_ignore_ascii_case(MEDIA_TYPE) {
+                return None;
+            }
+            without_places(CStr::from_ptr(data).to_bytes())?
+        };
+        Some(CString::new(data).expect("it was a C string"))
+    }
+}
+
+impl Feature {
+    /// Gives it native data.
+    pub fn set_native_data(&self, data: &CStr) {
+        // SAFETY: the feature is ours, and both texts are copied.
+        unsafe {
+            gdal_sys::OGR_F_SetNativeData(self.handle(), data.as_ptr());
+            gdal_sys::OGR_F_SetNativeMediaType(self.handle(), c_string(MEDIA_TYPE).as_ptr());
+        }
+    }
+}
+
+/// Leaves places out of the native data of a feature that is handed on.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) {
+    guarded((), || {
+        // SAFETY: the shim gives a feature, which stays during the call.
+        let data = unsafe { FeatureRef::new(feature) }.native_data();
+        let data = data.as_ref().map_or(ptr::null(), |data| data.as_ptr());
+        // SAFETY: as above; the text is null or a C string, which is copied.
+        unsafe { gdal_sys::OGR_F_SetNativeData(feature, data) };
+    });
+}
+
+/// The native data of a layer, as a list of metadata, without places; the caller frees it.
+///
+/// # Safety
+/// `metadata` is null or an array of C strings that ends in null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn meshmark_native_data(metadata: *const *const c_char) -> *mut *mut c_char {
+    guarded(ptr::null_mut(), || {
+        // SAFETY: the shim gives a list of C strings; GDAL copies what it is given.
+        unsafe {
+            let items = strings(metadata);
+            let items = items.iter().filter_map(|item| item.split_once('='));
+            let kept = items.filter_map(|(name, value)| Some((name, item_without_places(name, value)?)));
+            kept.fold(ptr::null_mut(), |list, (name, value)| {
+                gdal_sys::CSLAddString(list, c_string(&format!("{name}={value}")).as_ptr())
+            })
+        }
+    })
+}
