@@ -71,8 +71,8 @@ pub enum Error {
     )]
     BareTarget(String),
     #[error(
-        "it cannot be opened for update, as a marked map cannot be extended: leave -append, -update and -overwrite \
-         out{overwrite}"
+        "it cannot be opened for update, as a marked map cannot be extended: open it to read \
+         (ogrinfo -ro), and leave -append, -update and -overwrite out{overwrite}"
     )]
     Extended { overwrite: &'static str },
     #[error("{path} is {what}: a marked map is written to a file of its own, in a folder that exists")]
@@ -88,7 +88,7 @@ pub enum Error {
     #[error("{0}: nothing is written, what was there stays as it was")]
     Unfinished(String),
     #[error(
-        "only all but {errors} of {bits} bits of the message can be read from what was written with {digits}: raise \
+        "{errors} of the {bits} bits of the message cannot be read from what was written with {digits}: raise \
          AMPLITUDE{}",
         digits.more().map(|more| format!(", or keep more digits: {more}")).unwrap_or_default()
     )]

@@ -149,10 +149,8 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
         (Verdict::Match, reason)
     } else if fits(p_random) {
         another_message(found, each)
-    } else if would_show(found, each) {
-        (Verdict::NoMatch, format!("{MARK} would have shown, and it does not"))
     } else {
-        (Verdict::Inconclusive, format!("too few vertices match, or too roughly, for {MARK} to show"))
+        unseen(found, bits, each)
     };
     Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient), tried }
 }
@@ -183,15 +181,28 @@ pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64
     (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
 }
 
-/// Whether a full mark would be expected to pass both tests with a margin.
-fn would_show(found: &Demodulation, significance: f64) -> bool {
+/// No mark is seen: would a full one be expected to pass both tests, that of the key with a margin?
+fn unseen(found: &Demodulation, bits: usize, significance: f64) -> (Verdict, String) {
     let needed = (-2.0 * significance.ln()).sqrt(); // above the normal quantile
+    if (found.estimate.len() as f64).sqrt() <= needed {
+        let reason = format!(
+            "a message of {bits} bits is too short for its absence to show at a significance of {significance:.1e}: give \
+             a larger one, or mark with {} bits or more",
+            (needed * needed) as usize + 1
+        );
+        return (Verdict::Inconclusive, reason);
+    }
     // Were the mark there, b̂ would be near ±1 on the channel bits that are known at all.
     let known: f64 = found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum();
     // In the untouched reference nothing moved, so there is no noise either to measure a mark against.
     let nothing_moved = found.expected_sum > 0.0 && found.chip_correlations.iter().all(|a| *a == 0.0);
     let visible = nothing_moved || found.expected_mark_score() > needed + POWER_MARGIN;
-    visible && known.sqrt() > needed
+    match visible && known.sqrt() > needed {
+        true => (Verdict::NoMatch, format!("{MARK} would have shown, and it does not")),
+        false => {
+            (Verdict::Inconclusive, format!("too few vertices match, or too roughly, for {MARK} to show"))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -250,6 +261,20 @@ mod tests {
         assert_eq!(decide_among(&found, &random(&short), 1, 1e-6).verdict, Verdict::Match);
         let among = decide_among(&found, &random(&short), 17, 1e-6);
         assert!(among.reason.contains("for each of 17 that were tried"), "{}", among.reason);
+    }
+
+    #[test]
+    fn a_message_too_short_to_be_absent_is_inconclusive_and_says_so() {
+        let (short, other) = (Message::from_hex("0a1b2c").unwrap(), Message::from_hex("f5e4d3").unwrap());
+        let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
+        let decision = decide_among(&found, &random(&other), 1, 1e-6);
+        assert_eq!(decision.verdict, Verdict::Inconclusive);
+        assert!(
+            decision.reason.contains("24 bits is too short") && decision.reason.contains("28 bits or more")
+        );
+        let [long, other] = ["0a1b2c3d", "f5e4d3c2"].map(|hex| Message::from_hex(hex).unwrap());
+        let found = evidence(long.signs(), long.signs().iter().map(|b| 400.0 * b).collect());
+        assert_eq!(decide_among(&found, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{
     chart::Chart,
-    count, figure,
+    count, counted, figure,
     frame::Frame,
     map::{Arrows, marks},
     page, section, table,
@@ -67,7 +67,7 @@ fn sentence(comparison: &Comparison, provenance: Option<&Compared>) -> Markup {
         " are " (format!("{:.3} m", d.rms_m)) " from where they were (RMS), the furthest " (format!("{:.3} m", d.max_m))
         @if is_kept(comparison) {
             ", and nothing overlaps, crosses or is invalid that was not before"
-            @if comparison.overlaps.new_slivers > 0 { ", but for " (count(comparison.overlaps.new_slivers)) " slivers within the grid" }
+            @if comparison.overlaps.new_slivers > 0 { ", but for " (counted(comparison.overlaps.new_slivers, "sliver")) " within the grid" }
             "."
         }
         @else { ", and the topology changed in " (changes(comparison)) "." }
@@ -77,14 +77,13 @@ fn sentence(comparison: &Comparison, provenance: Option<&Compared>) -> Markup {
 fn changes(comparison: &Comparison) -> String {
     let c = comparison;
     let all = [
-        (c.compared.torn_vertices, "torn vertices"),
-        (c.validity.newly_invalid, "newly invalid geometries"),
-        (c.overlaps.new, "new overlaps"),
-        (c.crossings.new, "new crossings"),
-        (c.crossings.lost, "lost crossings"),
+        (c.compared.torn_vertices, "torn vertex"),
+        (c.validity.newly_invalid, "newly invalid geometry"),
+        (c.overlaps.new, "new overlap"),
+        (c.crossings.new, "new crossing"),
+        (c.crossings.lost, "lost crossing"),
     ];
-    let some: Vec<String> =
-        all.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{} {what}", count(*n))).collect();
+    let some: Vec<String> = all.iter().filter(|(n, _)| *n > 0).map(|(n, what)| counted(*n, what)).collect();
     some.join(", ")
 }
 
@@ -148,8 +147,8 @@ fn numbers(comparison: &Comparison) -> Markup {
         (
             "Areas",
             text(format!(
-                "of {} polygons change by {} on average; 99 % by up to {}, all by up to {}",
-                count(r.polygons),
+                "of {} change by {} on average; 99 % by up to {}, all by up to {}",
+                counted(r.polygons, "polygon"),
                 percent(r.mean_change, 3),
                 percent(r.p99_change, 3),
                 percent(r.max_change, 3)
@@ -159,8 +158,8 @@ fn numbers(comparison: &Comparison) -> Markup {
         (
             "Validity",
             text(format!(
-                "{} geometries invalid before, {} after; {} newly invalid",
-                count(c.validity.invalid_before),
+                "{} invalid before, {} after; {} newly invalid",
+                counted(c.validity.invalid_before, "geometry"),
                 count(c.validity.invalid_after),
                 count(c.validity.newly_invalid)
             )),
@@ -168,19 +167,19 @@ fn numbers(comparison: &Comparison) -> Markup {
         (
             "Overlaps",
             text(format!(
-                "{} pairs of polygons before, {} after; {} new ({:.6} m²), {} new slivers",
-                count(c.overlaps.before),
+                "{} of polygons before, {} after; {} new ({:.6} m²), {}",
+                counted(c.overlaps.before, "pair"),
                 count(c.overlaps.after),
                 count(c.overlaps.new),
                 c.overlaps.new_area_m2,
-                count(c.overlaps.new_slivers)
+                counted(c.overlaps.new_slivers, "new sliver")
             )),
         ),
         (
             "Crossings",
             text(format!(
-                "{} pairs of segments before, {} after; {} new, {} lost",
-                count(c.crossings.before),
+                "{} of segments before, {} after; {} new, {} lost",
+                counted(c.crossings.before, "pair"),
                 count(c.crossings.after),
                 count(c.crossings.new),
                 count(c.crossings.lost)

@@ -1,6 +1,6 @@
 //! What the finding does not say, what would weaken it, what makes it evidence, and how to repeat it.
 
-use super::{count, section};
+use super::{count, counted, section};
 use crate::{decision::Verdict, explain, report::Report};
 use maud::{Markup, html};
 
@@ -76,9 +76,9 @@ fn seen(report: &Report) -> Vec<String> {
     let v = &report.vertices;
     if 10 * v.matched < v.reference {
         found.push(format!(
-            "Only {} of {} vertices of the reference were found: the finding rests on a small part of the map.",
+            "Only {} of {} of the reference were found: the finding rests on a small part of the map.",
             count(v.matched),
-            count(v.reference)
+            counted(v.reference, "vertex")
         ));
     }
     if let Some(decoys) = &report.decoys {
@@ -91,20 +91,20 @@ fn seen(report: &Report) -> Vec<String> {
         }
     }
     if let Some(errors) = report.bit_errors.filter(|errors| *errors > 0 && report.verdict == Verdict::Match) {
-        let bits = if errors == 1 {
-            "1 bit of the message was"
-        } else {
-            &format!("{errors} bits of the message were")
-        };
-        found.push(format!("{bits} read wrong, so the mark is worn."));
+        let were = if errors == 1 { "was" } else { "were" };
+        found.push(format!(
+            "{} of the message {were} read wrong, so the mark is worn.",
+            counted(errors, "bit")
+        ));
     }
     if let Some(evidence) = &report.evidence {
         let against = evidence.patch_scores.iter().flatten().filter(|score| **score < -3.0).count();
         if against > 0 {
-            let patches = if against == 1 { "1 patch speaks" } else { &format!("{against} patches speak") };
+            let score = if against == 1 { "scores" } else { "score" };
             found.push(format!(
-                "{patches} clearly against the mark (3 standard deviations or more): parts of the suspect may \
-                 come from elsewhere."
+                "{} {score} clearly against the mark (3 standard deviations or more): parts of the suspect may come from \
+                 elsewhere.",
+                counted(against, "patch")
             ));
         }
     }

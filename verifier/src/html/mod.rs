@@ -86,6 +86,13 @@ fn count(number: usize) -> String {
     groups.join("\u{202f}")
 }
 
+/// A number and its noun, which is given in the singular.
+fn counted(number: usize, noun: &str) -> String {
+    let words = meshmark_core::counted(number, noun);
+    let (_, noun) = words.split_once(' ').expect("a number and a noun");
+    format!("{} {noun}", count(number))
+}
+
 /// `text` as one of the document's own: sentences of the explanation are complete, and begin with a capital letter.
 fn sentence(text: &str) -> Markup {
     html! { (text) " " }
