@@ -15,7 +15,7 @@ pub enum Error {
     NoVertices,
     TooFewVertices { vertices: usize, patch_size: usize, code: Code, chip_rate: usize },
     Collinear { vertices: usize },
-    TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize },
+    TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize, of: usize },
     CodeLength { bits: usize },
     PrecisionTooCoarse { precision: f64, metres: f64, tolerance_m: f64 },
     MessageLost { errors: usize, bits: usize },
@@ -65,8 +65,8 @@ impl Error {
                 "all {vertices} distinct vertices lie on one straight line, so they have no mesh: mark a map whose \
                  vertices spread over an area"
             ),
-            Error::TooManyCoefficients { code, bits, chip_rate, vertices } => {
-                too_many(*code, *bits, *chip_rate, *vertices, spelling)
+            Error::TooManyCoefficients { code, bits, chip_rate, vertices, of } => {
+                too_many(*code, *bits, *chip_rate, (*vertices, *of), spelling)
             }
             Error::CodeLength { bits } => format!(
                 "{} carries a message of exactly 128 bits, not {bits}: use 32 hexadecimal digits, a {}, or {}",
@@ -174,7 +174,16 @@ fn too_few(vertices: usize, patch_size: usize, code: Code, chip_rate: usize, spe
     format!("the map has {vertices} distinct vertices, fewer than {wanted}: {advice}")
 }
 
-fn too_many(code: Code, bits: usize, chip_rate: usize, vertices: usize, spelling: Spelling) -> String {
+/// `vertices` are those of the smallest patch and of the map.
+fn too_many(
+    code: Code,
+    bits: usize,
+    chip_rate: usize,
+    vertices: (usize, usize),
+    spelling: Spelling,
+) -> String {
+    let (vertices, of) = vertices;
+    let needed = code.expansion() * bits * chip_rate;
     let (room, repetition) = (vertices - 1, spelling.value("CODE", "REPETITION"));
     let fits = |code: Code| match room / (code.expansion() * bits) {
         0 => None,
@@ -190,11 +199,13 @@ fn too_many(code: Code, bits: usize, chip_rate: usize, vertices: usize, spelling
     };
     let remedies = [fits(code), uncoded.or_else(|| Some("a shorter message".into()))];
     let remedies: String = remedies.into_iter().flatten().map(|remedy| remedy + ", ").collect();
+    let more = match of > needed {
+        true => format!("a larger {}", spelling.name("PATCH_SIZE")),
+        false => "mark more layers together".into(),
+    };
     format!(
-        "a message of {bits} bits with {with}{} needs {} coefficients, but the smallest patch ({vertices} vertices) has \
-         {room}: use {remedies}or a larger {}",
+        "a message of {bits} bits with {with}{} needs {needed} coefficients, but the smallest patch ({vertices} vertices) has \
+         {room}: use {remedies}or {more}",
         spelling.value("CHIP_RATE", chip_rate),
-        code.expansion() * bits * chip_rate,
-        spelling.name("PATCH_SIZE")
     )
 }

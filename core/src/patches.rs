@@ -144,7 +144,8 @@ impl Patches {
         let carriers = code.channel_bits(bits)? * chip_rate;
         let smallest = self.patches.iter().map(|p| p.vertices.len()).min().unwrap_or(0);
         if carriers >= smallest {
-            return Err(Error::TooManyCoefficients { code, bits, chip_rate, vertices: smallest });
+            let of = self.positions_m.len();
+            return Err(Error::TooManyCoefficients { code, bits, chip_rate, vertices: smallest, of });
         }
         Ok(carriers)
     }

@@ -113,9 +113,9 @@ impl Error {
                 spelling.name("AMPLITUDE")
             ),
             Error::UnevenScale { at: [x, y], off_percent, crs } => format!(
-                "at the vertex ({x}, {y}) the scale of {crs} differs by {off_percent:.0} % from that in the middle of the \
-                 map, and a mark has one scale, so vertices would move further than is asked for: leave out what lies \
-                 far away, or reproject the map, for example to its UTM zone or to EPSG:4326"
+                "at the vertex ({x}, {y}) the scale of {crs} differs by {off_percent:.0} % from the one that a mark takes for \
+                 the whole map, so vertices would move further than is asked for: reproject the map, for example to its \
+                 UTM zone or to EPSG:4326, or leave out what lies far from the rest"
             ),
             Error::UnknownFormat { named, extension, known } => {
                 let what = match (named, extension) {

@@ -165,6 +165,11 @@ fn a_message_that_is_too_long_for_the_patches_is_told_what_fits() {
     host.mark("GPKG", "marked.gpkg", "map.gpkg", &advised).succeeds();
     let words = ["CODE=LDPC and CHIP_RATE=1 needs 256", "use a shorter message, or a larger PATCH_SIZE"];
     refuses_map(&Host::new(), &map(), &["-oo", "PATCH_SIZE=100"], &words);
+    let few = (0..200).map(|i| format!("{},{}", i % 20 * 31, i / 20 * 17 + i % 7));
+    write_points(&host, "few.geojson", few);
+    let options = ["-oo", "PATCH_SIZE=100", "-oo", "SRS=EPSG:3067"];
+    let words = ["use a shorter message, or mark more layers together"];
+    refuses_map(&host, &host.path("few.geojson").display().to_string(), &options, &words);
 }
 
 /// A GeoJSON map of points, in metres.
