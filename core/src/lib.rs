@@ -50,6 +50,7 @@ pub mod ground;
 pub mod junctions;
 pub mod key;
 pub mod map;
+pub mod map_data;
 pub mod mesh;
 pub mod message;
 mod motion;

@@ -83,8 +83,8 @@ fn sample(table: &VertexTable) -> Vec<[f64; 2]> {
 /// Whether a good part of the map is about where the reference is; both in the CRS of the reference.
 pub fn overlaps(map: &Survey, reference: &Survey) -> bool {
     let Some(crs) = &reference.crs else { return true };
-    let Some(region) = Region::of(crs, &reference.vertices) else { return true };
-    region.share(&crs.degrees(&sample(&map.vertices))) >= LEAST_SHARE
+    let Some(region) = Region::of(crs, &reference.data.vertices) else { return true };
+    region.share(&crs.degrees(&sample(&map.data.vertices))) >= LEAST_SHARE
 }
 
 /// What the raw numbers of a map may be, so that the map comes to lie about where the reference is, the most
@@ -95,8 +95,8 @@ pub fn likely_assumptions(
     reference: &Survey,
 ) -> Vec<Assumption> {
     let Some(crs) = &reference.crs else { return Vec::new() };
-    let Some(region) = Region::of(crs, &reference.vertices) else { return Vec::new() };
-    let numbers = sample(&raw.vertices);
+    let Some(region) = Region::of(crs, &reference.data.vertices) else { return Vec::new() };
+    let numbers = sample(&raw.data.vertices);
     let swapped: Vec<[f64; 2]> = numbers.iter().map(|[x, y]| [*y, *x]).collect();
     let known = [Some(crs), own].into_iter().flatten().cloned();
     let codes = codes_at(region.centre()).into_iter();

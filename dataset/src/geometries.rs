@@ -1,7 +1,7 @@
 //! Geometries as chains of vertices.
 
 use crate::{
-    survey::Chains,
+    chains::Chains,
     wkb::{self, Step, WkbError},
 };
 use gdal::vector::Geometry;
@@ -153,7 +153,7 @@ mod tests {
         let geometries = map.geometries.unwrap();
         assert_eq!(geometries.len(), 2 * made_again.len());
         for number in 0..geometries.len() {
-            let outline = geometries.outline(number, map.vertices.coords());
+            let outline = geometries.outline(number, map.data.vertices.coords());
             let text = outline.geometry().unwrap().iso_wkt().unwrap();
             assert_eq!(text, made_again[number % made_again.len()].1);
         }

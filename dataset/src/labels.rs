@@ -1,30 +1,9 @@
 //! Labels: attribute texts with the place they stand for, from which a verifier makes landmarks.
 
-use crate::survey::LabelFields;
+use crate::LabelFields;
 use gdal::vector::{Feature, FieldValue};
 use geo::{Centroid, Geometry, HasDimensions, dimensions::Dimensions};
-
-/// What kind of place a label has. Lines are the least certain: they are cut and merged by others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dimension {
-    /// The point itself.
-    Point,
-    /// The centroid by length.
-    Line,
-    /// The centroid by area.
-    Area,
-}
-
-/// An attribute value of a feature and the feature's place.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Label {
-    /// A string, or an integer in decimal.
-    pub value: String,
-    /// CRS units.
-    pub point: [f64; 2],
-    /// What the point is of.
-    pub dimension: Dimension,
-}
+use meshmark_core::map_data::{Dimension, Label};
 
 /// The labels of one feature, and where they are.
 pub(crate) fn of_feature(

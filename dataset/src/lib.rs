@@ -4,6 +4,7 @@
 #![warn(missing_docs)]
 
 mod assumption;
+mod chains;
 mod crs;
 mod crs_wkt;
 pub mod decimals;
@@ -17,10 +18,11 @@ mod geometries;
 pub mod geopackage;
 mod labels;
 pub mod marking;
+mod polylines;
 pub mod publication;
 pub mod quality;
 pub mod read_back;
-mod shapes;
+mod selection;
 mod survey;
 mod threads;
 mod turns;
@@ -33,11 +35,10 @@ pub use error::{Error, Result};
 pub use features::{FeatureGeometry, features};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};
-pub use labels::{Dimension, Label};
-pub use shapes::Shape;
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
 
 pub use threads::{ThreadPool, threads};
 
-pub use survey::{LabelFields, Selection, Survey, Target, survey};
+pub use selection::{LabelFields, Selection, Target};
+pub use survey::{Survey, survey};

@@ -121,7 +121,7 @@ pub fn warnings(
     }
     let channel_bits = parameters.code.encode(message).len();
     let coefficients = 2 * patches * channel_bits * parameters.chip_rate; // on two axes
-    let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.vertices.len() as f64).sqrt();
+    let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.data.vertices.len() as f64).sqrt();
     if wanted_rms_m > parameters.tolerance_m {
         warnings.push(format!(
             "{} would move the vertices by {wanted_rms_m:.2} m RMS, more than {} m, where many of them are held: the map \
@@ -169,9 +169,9 @@ fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
 /// What the record says about the map.
 pub fn reference(map: &Survey, patches: usize) -> Reference {
     Reference {
-        vertices: map.vertices.len(),
+        vertices: map.data.vertices.len(),
         patches,
-        vertices_sha256: map.vertices.digest(),
+        vertices_sha256: map.data.vertices.digest(),
         crs: map.crs.as_ref().map(|crs| crs.label()),
     }
 }

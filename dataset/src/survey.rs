@@ -1,109 +1,37 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    CoordinateSystem, Error, Geometries, Label, Result, Shape,
+    CoordinateSystem, Error, Geometries, LabelFields, Result, Selection, Target,
+    chains::{Chains, read_geometry},
     crs::{self, reproject},
     extent::Extent,
-    labels, parse_srs, shapes,
+    labels, parse_srs, polylines,
     turns::turn,
-    wkb::{self, Step},
 };
 use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{
-    disjoint_sets::DisjointSets, ground::Ground, map::Map, options::join_list, scale::ScaleLattice,
-    vertices::VertexTable,
+    ground::Ground,
+    map::Map,
+    map_data::{Label, MapData, Polyline},
+    options::join_list,
+    scale::ScaleLattice,
 };
 use std::collections::BTreeMap;
-
-/// Which attributes become labels. With labels come shapes: both are for registration.
-#[derive(Debug, Clone, Copy)]
-pub enum LabelFields<'a> {
-    /// None, and no shapes: only the vertices are wanted.
-    None,
-    /// Every string and integer field.
-    All,
-    /// The fields of these names.
-    Named(&'a [String]),
-}
-
-impl LabelFields<'_> {
-    pub(crate) fn wants(&self, field: &str) -> bool {
-        match self {
-            LabelFields::None => false,
-            LabelFields::All => true,
-            LabelFields::Named(names) => names.iter().any(|name| name.eq_ignore_ascii_case(field)),
-        }
-    }
-}
-
-/// Which CRS coordinates are read in.
-#[derive(Debug, Clone, Copy)]
-pub enum Target<'a> {
-    /// Their own, which all chosen layers must share.
-    Own,
-    /// This one: layers in another CRS are reprojected.
-    Crs(&'a CoordinateSystem),
-    /// Whatever they are in: the numbers as they stand.
-    Raw,
-}
-
-/// What to read of a dataset, and how.
-#[derive(Clone, Copy)]
-pub struct Selection<'a> {
-    /// Layers that form the map; all when `None`.
-    pub layers: Option<&'a [String]>,
-    /// CRS of a source that has none.
-    pub srs: Option<&'a str>,
-    /// Attributes to take along.
-    pub labels: LabelFields<'a>,
-    /// Which CRS the coordinates shall be in.
-    pub target: Target<'a>,
-    /// Whether to keep what the geometries are made of.
-    pub geometries: bool,
-    /// Refuse a map of more vertices, duplicates included.
-    pub most_vertices: usize,
-    /// What GDAL's last failure was, if there was one since the walk began: drivers end a layer early on a
-    /// read error, and only the process's error handler tells that from its end.
-    pub last_failure: &'a dyn Fn() -> Option<String>,
-}
-
-/// The whole map, without attributes, in its own CRS.
-impl Default for Selection<'_> {
-    fn default() -> Self {
-        Selection {
-            layers: None,
-            srs: None,
-            labels: LabelFields::None,
-            target: Target::Own,
-            geometries: false,
-            most_vertices: crate::MOST_VERTICES,
-            last_failure: &|| None,
-        }
-    }
-}
 
 /// A map as the mark sees it.
 #[derive(Debug)]
 pub struct Survey {
-    /// Its distinct vertices.
-    pub vertices: VertexTable,
-    /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
-    pub segments: Vec<[u32; 2]>,
-    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
-    pub polygons: Vec<u32>,
+    /// Its numbers.
+    pub data: MapData,
     /// Its CRS: the common one of its layers, or the one it was reprojected into.
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and could be in degrees.
     ground: Option<Ground>,
     /// Metres per unit where a vertex is, when they are others.
     lattice: Option<ScaleLattice>,
-    /// Attribute texts and their places.
-    pub labels: Vec<Label>,
-    /// Rings and lines.
-    pub shapes: Vec<Shape>,
     /// The geometries in the order they were read, if they were asked for.
     pub geometries: Option<Geometries>,
     /// How many features each layer that was read has, by the layer's number in the dataset.
@@ -120,40 +48,11 @@ impl Survey {
         crs: &CoordinateSystem,
         bring: impl Fn(Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>>,
     ) -> Result<Survey> {
-        let (vertices, indices) = VertexTable::indexed(bring(self.vertices.coords().to_vec())?)?;
-        let moved = |segment: &[u32; 2]| segment.map(|v| indices[v as usize]);
-        let mut segments: Vec<[u32; 2]> = self
-            .segments
-            .iter()
-            .map(moved)
-            .filter(|[a, b]| a != b)
-            .map(|[a, b]| [a.min(b), a.max(b)])
-            .collect();
-        segments.sort_unstable();
-        segments.dedup();
-        let mut joined = DisjointSets::new(vertices.len());
-        indices.iter().zip(&self.polygons).for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
-        let polygons = joined.roots();
-        let places = bring(self.labels.iter().map(|label| label.point).collect())?;
-        let in_shapes = bring(self.shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect())?;
-        let (mut labels, mut shapes) = (self.labels.clone(), self.shapes.clone());
-        labels.iter_mut().zip(places).for_each(|(label, place)| label.point = place);
-        let of_shapes = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
-        of_shapes.zip(in_shapes).for_each(|(vertex, place)| *vertex = place);
-        let ground = crs::ground(Some(crs), &vertices)?;
-        let lattice = crs.lattice(&vertices, &ground);
-        Ok(Survey {
-            vertices,
-            segments,
-            polygons,
-            crs: Some(crs.clone()),
-            ground: Some(ground),
-            lattice,
-            labels,
-            shapes,
-            geometries: None,
-            features: self.features.clone(),
-        })
+        let data = self.data.moved(bring)?;
+        let ground = crs::ground(Some(crs), &data.vertices)?;
+        let lattice = crs.lattice(&data.vertices, &ground);
+        let (crs, ground, features) = (Some(crs.clone()), Some(ground), self.features.clone());
+        Ok(Survey { data, crs, ground, lattice, geometries: None, features })
     }
 
     /// Metres on the ground.
@@ -177,9 +76,7 @@ impl Survey {
     /// # Errors
     /// [`Error::NoCrs`].
     pub fn map(&self) -> Result<Map<'_>> {
-        let Survey { vertices, segments, polygons, .. } = self;
-        let lattice = self.lattice.as_ref();
-        Ok(Map { vertices, segments, polygons, ground: self.ground()?, lattice })
+        Ok(self.data.on(self.ground()?, self.lattice.as_ref()))
     }
 }
 
@@ -191,7 +88,7 @@ impl Survey {
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let chosen = chosen_layers(dataset, selection.layers)?;
     let mut walk =
-        Walk { selection, crs: None, chains: Chains::default(), labels: Vec::new(), shapes: Vec::new() };
+        Walk { selection, crs: None, chains: Chains::default(), labels: Vec::new(), polylines: Vec::new() };
     let mut features = BTreeMap::new();
     for (index, name) in &chosen {
         let _turn = turn(dataset, name)?;
@@ -202,18 +99,18 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
     let mut chains = walk.chains;
-    let (vertices, indices) = VertexTable::indexed(std::mem::take(&mut chains.coords))?;
-    let segments = segments(&indices, &chains.starts);
-    let polygons = polygons(&indices, &chains.starts, &chains.kinds, vertices.len());
-    let ground = match crs::ground(crs.as_ref(), &vertices) {
+    let coords = std::mem::take(&mut chains.coords);
+    let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
+    let data = MapData { labels: walk.labels, polylines: walk.polylines, ..data };
+    let ground = match crs::ground(crs.as_ref(), &data.vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
         Err(other) => return Err(other),
     };
-    let lattice = crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&vertices, ground));
+    let lattice =
+        crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&data.vertices, ground));
     let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
-    let (labels, shapes) = (walk.labels, walk.shapes);
-    Ok(Survey { vertices, segments, polygons, crs, ground, lattice, labels, shapes, geometries, features })
+    Ok(Survey { data, crs, ground, lattice, geometries, features })
 }
 
 /// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
@@ -229,90 +126,20 @@ pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Res
     Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())
 }
 
-/// Coordinates of rings, lines and points, one after the other.
-#[derive(Clone, Default)]
-pub(crate) struct Chains {
-    coords: Vec<[f64; 2]>,
-    /// Where in `coords` each of them starts, ascending.
-    pub(crate) starts: Vec<u32>,
-    /// What each of them is.
-    pub(crate) kinds: Vec<Step>,
-    /// Which of them is the first of each geometry, ascending.
-    pub(crate) firsts: Vec<u32>,
-    /// The geometries that are more than their chains, by their numbers.
-    pub(crate) others: BTreeMap<u32, Vec<u8>>,
-}
-
-impl Chains {
-    fn begin_geometry(&mut self) {
-        self.firsts.push(self.starts.len() as u32);
-    }
-
-    fn push(&mut self, step: Step, point: [f64; 2]) {
-        if step != Step::Next {
-            self.starts.push(self.coords.len() as u32);
-            self.kinds.push(step);
-        }
-        self.coords.push(point);
-    }
-
-    fn append(&mut self, other: &mut Chains) {
-        let (of_starts, offset) = (self.starts.len() as u32, self.coords.len() as u32);
-        let geometries = self.firsts.len() as u32;
-        let others = std::mem::take(&mut other.others);
-        self.others.extend(others.into_iter().map(|(number, wkb)| (number + geometries, wkb)));
-        self.firsts.extend(other.firsts.drain(..).map(|first| first + of_starts));
-        self.starts.extend(other.starts.drain(..).map(|start| start + offset));
-        self.coords.append(&mut other.coords);
-        self.kinds.append(&mut other.kinds);
-    }
-}
-
-/// Pairs of consecutive vertices: `indices` of every coordinate, `starts` of the chains among them.
-fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
-    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
-    let chains = starts.iter().zip(ends).map(|(&start, end)| &indices[start as usize..end]);
-    let mut segments: Vec<[u32; 2]> = chains
-        .flat_map(|chain| chain.windows(2))
-        .filter(|pair| pair[0] != pair[1])
-        .map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])])
-        .collect();
-    segments.sort_unstable();
-    segments.dedup();
-    segments.shrink_to_fit();
-    segments
-}
-
-/// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
-fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) -> Vec<u32> {
-    let mut joined = DisjointSets::new(vertices);
-    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
-    let mut shell = 0;
-    for ((&start, end), kind) in starts.iter().zip(ends).zip(kinds) {
-        match kind {
-            Step::Shell => shell = indices[start as usize],
-            Step::Hole => {}
-            Step::First | Step::Next => continue,
-        }
-        indices[start as usize..end].iter().for_each(|&v| joined.join(v, shell));
-    }
-    joined.roots()
-}
-
 struct Walk<'a> {
     selection: &'a Selection<'a>,
     /// The first layer with vertices, and its CRS.
     crs: Option<(String, Option<CoordinateSystem>)>,
     chains: Chains,
     labels: Vec<Label>,
-    shapes: Vec<Shape>,
+    polylines: Vec<Polyline>,
 }
 
 impl Walk<'_> {
     /// Reads a layer; how many features it has.
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<u64> {
         let columns = self.columns(layer)?;
-        let (first_label, first_shape) = (self.labels.len(), self.shapes.len());
+        let (first_label, first_polyline) = (self.labels.len(), self.polylines.len());
         let mut of_column = vec![Chains::default(); columns.len()];
         let mut features = 0;
         for feature in layer.features() {
@@ -347,16 +174,16 @@ impl Walk<'_> {
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             reproject(&mut points, crs.as_ref(), target, name)?;
             labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
-            let shapes = &mut self.shapes[first_shape..];
-            let mut vertices: Vec<_> = shapes.iter().flat_map(|shape| &shape.vertices).copied().collect();
+            let polylines = &mut self.polylines[first_polyline..];
+            let mut vertices: Vec<_> = polylines.iter().flat_map(|line| &line.vertices).copied().collect();
             reproject(&mut vertices, crs.as_ref(), target, name)?;
-            let places = shapes.iter_mut().flat_map(|shape| &mut shape.vertices);
+            let places = polylines.iter_mut().flat_map(|line| &mut line.vertices);
             places.zip(vertices).for_each(|(place, vertex)| *place = vertex);
         }
         Ok(features)
     }
 
-    /// Labels and shapes of a feature. Curves have no counterpart in geo and give none.
+    /// Labels and polylines of a feature. Curves have no counterpart in geo and give none.
     fn describe(&mut self, feature: &Feature) {
         if matches!(self.selection.labels, LabelFields::None) {
             return;
@@ -368,7 +195,7 @@ impl Walk<'_> {
         }
         let Ok(geometry) = geometry.to_geo() else { return };
         labels::of_feature(feature, &geometry, &self.selection.labels, &mut self.labels);
-        shapes::of_geometry(&geometry, &mut self.shapes);
+        polylines::of_geometry(&geometry, &mut self.polylines);
     }
 
     /// The CRS of every geometry column of a layer.
@@ -409,47 +236,6 @@ impl Walk<'_> {
     }
 }
 
-/// Appends the coordinates of one geometry of a feature.
-fn read_geometry(
-    feature: &Feature,
-    column: usize,
-    layer: &str,
-    (keeps_geometries, extent): (bool, Extent),
-    chains: &mut Chains,
-) -> Result<()> {
-    let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
-    let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
-    let failed = |reason: String| Error::Geometry { layer: layer.into(), fid: fid(), reason };
-    let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
-    if keeps_geometries && !wkb::is_plain(&bytes) {
-        chains.others.insert(chains.firsts.len() as u32, bytes.clone());
-    }
-    chains.begin_geometry();
-    let mut visit = |step, point: [f64; 2]| {
-        extent.check(point, layer, fid)?;
-        chains.push(step, point);
-        Ok(point)
-    };
-    match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
-        visit(step, point).map_err(Visit::Ours)
-    }) {
-        Ok(()) => Ok(()),
-        Err(Visit::Ours(error)) => Err(error),
-        Err(Visit::Wkb(error)) => Err(failed(error.to_string())),
-    }
-}
-
-enum Visit {
-    Ours(Error),
-    Wkb(wkb::WkbError),
-}
-
-impl From<wkb::WkbError> for Visit {
-    fn from(error: wkb::WkbError) -> Self {
-        Visit::Wkb(error)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -457,14 +243,6 @@ mod tests {
         DriverManager,
         vector::{Geometry, LayerOptions, OGRwkbGeometryType},
     };
-
-    #[test]
-    fn segments_join_neighbours_of_a_chain_once_and_no_vertex_with_itself() {
-        // A triangle 0 1 2 0, a line 2 1 1 3 along one of its sides, a point 4.
-        let indices = [0, 1, 2, 0, 2, 1, 1, 3, 4];
-        assert_eq!(segments(&indices, &[0, 4, 8]), [[0, 1], [0, 2], [1, 2], [1, 3]]);
-        assert_eq!(segments(&[], &[]), Vec::<[u32; 2]>::new());
-    }
 
     #[test]
     fn two_layers_of_one_name_are_both_read() {
@@ -480,15 +258,7 @@ mod tests {
         for layers in [None, Some(&layers[..])] {
             let selection = Selection { layers, most_vertices: 10, ..Selection::default() };
             let map = survey(&dataset, &selection).unwrap();
-            assert_eq!(map.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
+            assert_eq!(map.data.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }
-    }
-
-    #[test]
-    fn polygons_are_joined_by_shared_vertices_and_to_their_holes_but_not_by_lines() {
-        // A polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to 8, a polygon 9 10 11.
-        let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
-        let kinds = [Step::Shell, Step::Hole, Step::Shell, Step::First, Step::Shell];
-        assert_eq!(polygons(&indices, &[0, 4, 8, 12, 14], &kinds, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
     }
 }

@@ -15,8 +15,8 @@ use meshmark_core::{
     spectrum::Basis,
 };
 use meshmark_dataset::{Selection, Survey, survey};
+use meshmark_detection::matching::Matcher;
 use meshmark_host_tests::cgal;
-use meshmark_verifier::matching::Matcher;
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -102,7 +102,7 @@ fn survey_of(map: &str) -> Survey {
 
 /// The vertices of a map, metres from its middle.
 fn points() -> Vec<[f64; 2]> {
-    survey_of(MAP).vertices.local(1.0)
+    survey_of(MAP).data.vertices.local(1.0)
 }
 
 fn first_patch(patch_size: usize) -> Patch {

@@ -17,13 +17,12 @@ use meshmark_core::{
     message::Message,
     options::Parameters,
 };
-use meshmark_verifier::{
-    Demodulator, Request,
+use meshmark_detection::{
+    Demodulator,
     decision::{Decision, Expected, Null, decide_among},
-    progress::Progress,
     registration::Start,
-    verify,
 };
+use meshmark_verifier::{Request, progress::Progress, verify};
 use plotters::style::{BLACK, BLUE, RED};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -102,7 +102,7 @@ impl Marking {
         let message = key().recipient_message(RECIPIENT);
         let marked = embed(&on_ground, &key(), &message, &parameters).expect("it fits");
         let patches = Patches::new(&on_ground, &parameters).expect("it fits");
-        Marking { reference: map.vertices, ground, parameters, message, marked, patches }
+        Marking { reference: map.data.vertices, ground, parameters, message, marked, patches }
     }
 
     /// Every intermediate value an implementer may want to compare, by the steps of the algorithm.

@@ -64,7 +64,7 @@ fn the_message_can_be_read_from_what_ogr2ogr_wrote() {
     let moves = moves(&contents::read(&fixture("kotka.gpkg")), &contents::read(&host.path("marked.gpkg")));
 
     let reference = survey_of(&fixture("kotka.gpkg"));
-    let (table, ground) = (&reference.vertices, reference.ground().unwrap());
+    let (table, ground) = (&reference.data.vertices, reference.ground().unwrap());
     let patches = Patches::new(&reference.map().unwrap(), &record.parameters().unwrap()).unwrap();
     let mut observed = vec![None; table.len()];
     for (from, to) in moves {

@@ -207,12 +207,12 @@ impl Marking {
 
     /// Where the vertices go.
     pub fn moves(&self) -> Moves<'_> {
-        Moves { from: &self.map.vertices, to: &self.moved }
+        Moves { from: &self.map.data.vertices, to: &self.moved }
     }
 
     /// The furthest any vertex moved along x and y, CRS units.
     pub fn reach(&self) -> [f64; 2] {
-        let moves = self.map.vertices.coords().iter().zip(&self.moved);
+        let moves = self.map.data.vertices.coords().iter().zip(&self.moved);
         moves.fold([0.0; 2], |reach: [f64; 2], (from, to)| {
             [0, 1].map(|axis| reach[axis].max((to[axis] - from[axis]).abs()))
         })

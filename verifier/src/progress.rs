@@ -1,7 +1,8 @@
 //! Progress of long steps, shown on a terminal only.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use std::{collections::BTreeMap, time::Instant};
+use meshmark_detection::{Listener, Progress as Event};
+use std::{collections::BTreeMap, sync::Mutex, time::Instant};
 
 /// Shows what is being done and remembers how long each stage took.
 pub struct Progress {
@@ -34,6 +35,18 @@ impl Progress {
     pub fn stepper(&self) -> impl Fn(usize) + Sync + use<> {
         let bar = self.bar.clone();
         move |steps| bar.inc(steps as u64)
+    }
+
+    /// Runs `work`, which reports its stages and steps.
+    pub fn listen<T>(&mut self, work: impl FnOnce(Listener) -> T) -> T {
+        let step = self.stepper();
+        let stages = Mutex::new(self);
+        work(&|event| match event {
+            Event::Stage { stage, steps } => {
+                stages.lock().expect("nobody panics with it").start(stage, steps)
+            }
+            Event::Steps(steps) => step(steps),
+        })
     }
 
     /// Ends the last stage and clears the line; seconds by stage.

@@ -50,7 +50,7 @@ fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
 /// The vertices of the marked map.
 fn marked() -> Vec<[f64; 2]> {
     let map = survey(&Dataset::open(fixture("vectors/marked.gpkg")).unwrap(), &Selection::default()).unwrap();
-    map.vertices.coords().to_vec()
+    map.data.vertices.coords().to_vec()
 }
 
 /// Points in EPSG:3067 as GeoJSON, with `crs` in the place of the CRS.

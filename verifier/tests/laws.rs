@@ -7,18 +7,17 @@ use meshmark_core::{
     embedding::embed,
     ground::Ground,
     key::SecretKey,
-    map::Map,
+    map_data::{Dimension, Label, MapData},
     message::Message,
     options::Parameters,
     patches::Patches,
     vertices::VertexTable,
 };
-use meshmark_dataset::{Dimension, Label, Selection, survey};
-use meshmark_verifier::{
-    affine::Affine,
+use meshmark_dataset::{Selection, survey};
+use meshmark_detection::{
     decision::{Decision, Expected, Null, Verdict, decide_among},
     matching::Matcher,
-    registration::{Registrar, Side, Start},
+    registration::{Affine, Registrar, Start},
 };
 use proptest::prelude::*;
 
@@ -28,9 +27,7 @@ fn random(carried: Message) -> Expected {
 
 /// A marked map with labels on every twentieth vertex.
 struct Case {
-    reference: VertexTable,
-    segments: Vec<[u32; 2]>,
-    polygons: Vec<u32>,
+    reference: MapData,
     ground: Ground,
     key: SecretKey,
     marked: Vec<[f64; 2]>,
@@ -45,22 +42,7 @@ impl Case {
         let message = key.recipient_message("ACME GmbH");
         let marked = embed(&on_ground, &key, &message, &Parameters::default()).unwrap();
         let ground = on_ground.ground;
-        Case {
-            reference: map.vertices,
-            segments: map.segments,
-            polygons: map.polygons,
-            ground,
-            key,
-            marked: marked.coords,
-        }
-    }
-
-    fn map(&self) -> Map<'_> {
-        Map {
-            segments: &self.segments,
-            polygons: &self.polygons,
-            ..Map::of_points(&self.reference, self.ground)
-        }
+        Case { reference: map.data, ground, key, marked: marked.coords }
     }
 
     fn labels(&self, coords: &[[f64; 2]]) -> Vec<Label> {
@@ -75,20 +57,19 @@ impl Case {
     /// Registers, matches and demodulates a suspect whose vertices are `moved`, in canonical order of
     /// the reference, under a key.
     fn demodulate(&self, moved: &[[f64; 2]], key: &SecretKey) -> Demodulation {
-        let suspect = VertexTable::new(moved.to_vec()).unwrap();
-        let (ours, theirs) = (self.labels(self.reference.coords()), self.labels(moved));
-        let reference = Side { vertices: &self.reference, labels: &ours, shapes: &[] };
-        let found = Registrar::new(reference, &self.ground, 1.0)
-            .register(Side { vertices: &suspect, labels: &theirs, shapes: &[] }, Start::Auto);
-        let coords = found.apply(suspect.coords());
-        let centre = self.reference.centre();
-        let matches = Matcher::new(self.reference.coords(), &self.ground, centre).all(&coords, 1.0);
-        let pairs = self.reference.coords().iter().zip(&matches.suspect_of);
+        let vertices = &self.reference.vertices;
+        let labelled = |vertices: VertexTable, labels| MapData { labels, ..MapData::of_points(vertices) };
+        let reference = labelled(vertices.clone(), self.labels(vertices.coords()));
+        let suspect = labelled(VertexTable::new(moved.to_vec()).unwrap(), self.labels(moved));
+        let found = Registrar::new(&reference, &self.ground, 1.0).register(&suspect, Start::Auto);
+        let coords = found.apply(suspect.vertices.coords());
+        let matches = Matcher::new(vertices.coords(), &self.ground, vertices.centre()).all(&coords, 1.0);
+        let pairs = vertices.coords().iter().zip(&matches.suspect_of);
         let metres =
             |(r, s): (&[f64; 2], &Option<u32>)| s.map(|s| self.ground.metres_between(*r, coords[s as usize]));
         let observed: Vec<_> = pairs.map(metres).collect();
         let parameters = Parameters::default();
-        let patches = Patches::new(&self.map(), &parameters).unwrap();
+        let patches = Patches::new(&self.reference.on(self.ground, None), &parameters).unwrap();
         let disturbance = Deformation::estimate(&patches, &observed, 256, &parameters).unwrap().predict(
             &patches,
             &observed,
@@ -145,7 +126,8 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
     let case = Case::kotka();
     let message = |name: &str| case.key.recipient_message(name);
     let parameters = Parameters::default();
-    let other = embed(&case.map(), &case.key, &message("Another Ltd"), &parameters).unwrap();
+    let other = embed(&case.reference.on(case.ground, None), &case.key, &message("Another Ltd"), &parameters)
+        .unwrap();
     let pairs = case.marked.iter().zip(&other.coords);
     let mean: Vec<[f64; 2]> = pairs.map(|(a, b)| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]).collect();
     let found = case.demodulate(&mean, &case.key);
@@ -158,8 +140,8 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
 #[test]
 fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
     let case = Case::kotka();
-    let patches = Patches::new(&case.map(), &Parameters::default()).unwrap();
-    let pairs = case.reference.coords().iter().zip(&case.marked);
+    let patches = Patches::new(&case.reference.on(case.ground, None), &Parameters::default()).unwrap();
+    let pairs = case.reference.vertices.coords().iter().zip(&case.marked);
     let observed: Vec<_> = pairs.map(|(r, s)| Some(case.ground.metres_between(*r, *s))).collect();
     let p_mark = |seed: u8| {
         let key = SecretKey::from_bytes([seed; 32]);
@@ -187,7 +169,7 @@ fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
 #[test]
 fn an_unmarked_map_is_no_match() {
     let case = Case::kotka();
-    let found = case.demodulate(case.reference.coords(), &case.key);
+    let found = case.demodulate(case.reference.vertices.coords(), &case.key);
     let decision = case.decide(&found, &case.key.recipient_message("ACME GmbH"));
     assert_eq!(decision.verdict, Verdict::NoMatch);
 }

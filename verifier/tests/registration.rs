@@ -1,11 +1,12 @@
 //! The way back is found, from what is left: polygons, lines, points, parts, thinned or bent maps.
 
-use meshmark_core::{ground::Ground, vertices::VertexTable};
-use meshmark_dataset::{LabelFields, Selection, Shape, survey};
-use meshmark_verifier::{
-    affine::Affine,
-    registration::{Registrar, Registration, Side, Start},
+use meshmark_core::{
+    ground::Ground,
+    map_data::{MapData, Polyline},
+    vertices::VertexTable,
 };
+use meshmark_dataset::{LabelFields, Selection, survey};
+use meshmark_detection::registration::{Affine, Registrar, Registration, Start};
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
@@ -13,11 +14,11 @@ use rand_chacha::{
 
 const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 
-/// Vertices and shapes without attributes.
+/// Vertices and polylines without attributes.
 #[derive(Clone)]
 struct Map {
     points: Vec<[f64; 2]>,
-    shapes: Vec<Shape>,
+    polylines: Vec<Polyline>,
 }
 
 struct Random(ChaCha8Rng);
@@ -34,8 +35,11 @@ impl Random {
 }
 
 impl Map {
-    fn of(shapes: Vec<Shape>) -> Self {
-        Map { points: shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect(), shapes }
+    fn of(polylines: Vec<Polyline>) -> Self {
+        Map {
+            points: polylines.iter().flat_map(|polyline| polyline.vertices.iter().copied()).collect(),
+            polylines,
+        }
     }
 
     fn fixture(name: &str) -> Self {
@@ -46,7 +50,8 @@ impl Map {
                 &Selection { labels: LabelFields::Named(&[]), ..Selection::default() },
             )
             .unwrap()
-            .shapes,
+            .data
+            .polylines,
         )
     }
 
@@ -62,7 +67,7 @@ impl Map {
                 at = [at[0] + length * heading.cos(), at[1] + length * heading.sin()];
                 at
             };
-            Shape { vertices: (0..25).map(step).collect(), closed: false }
+            Polyline { vertices: (0..25).map(step).collect(), closed: false }
         };
         Map::of((0..40).map(&mut road).collect())
     }
@@ -71,23 +76,23 @@ impl Map {
     fn trees() -> Self {
         let mut random = Random::new(6);
         let points = (0..2000).map(|_| [random.symmetric(400.0), random.symmetric(300.0)]).collect();
-        Map { points, shapes: Vec::new() }
+        Map { points, polylines: Vec::new() }
     }
 
     fn only(mut self, closed: bool) -> Self {
-        self.shapes.retain(|shape| shape.closed == closed);
-        Map::of(self.shapes)
+        self.polylines.retain(|polyline| polyline.closed == closed);
+        Map::of(self.polylines)
     }
 
-    fn without_shapes(self) -> Self {
-        Map { shapes: Vec::new(), ..self }
+    fn without_polylines(self) -> Self {
+        Map { polylines: Vec::new(), ..self }
     }
 
     /// Every vertex moved; occurrences of one vertex move alike.
     fn moved(&self, f: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let mut moved = self.clone();
         moved.points.iter_mut().for_each(|p| *p = f(*p));
-        moved.shapes.iter_mut().flat_map(|s| &mut s.vertices).for_each(|p| *p = f(*p));
+        moved.polylines.iter_mut().flat_map(|s| &mut s.vertices).for_each(|p| *p = f(*p));
         moved
     }
 
@@ -97,6 +102,10 @@ impl Map {
             let mut random = Random::new(p[0].to_bits() ^ p[1].to_bits().rotate_left(17));
             [p[0] + random.symmetric(half_width), p[1] + random.symmetric(half_width)]
         })
+    }
+
+    fn data(&self) -> MapData {
+        MapData { polylines: self.polylines.clone(), ..MapData::of_points(self.vertices()) }
     }
 
     fn vertices(&self) -> VertexTable {
@@ -110,10 +119,7 @@ fn affine(mirror: f64) -> Affine {
 }
 
 fn register(reference: &Map, suspect: &Map, start: Start) -> Registration {
-    let (ours, theirs) = (reference.vertices(), suspect.vertices());
-    let ours = Side { vertices: &ours, labels: &[], shapes: &reference.shapes };
-    let theirs = Side { vertices: &theirs, labels: &[], shapes: &suspect.shapes };
-    Registrar::new(ours, &METRES, 1.0).register(theirs, start)
+    Registrar::new(&reference.data(), &METRES, 1.0).register(&suspect.data(), start)
 }
 
 /// Root mean square distance between vertices of the reference and where `there` and back takes them.
@@ -155,10 +161,10 @@ fn lines_give_the_affine_map_when_nothing_else_is_left() {
 fn lines_of_which_a_third_of_the_vertices_is_deleted_give_the_affine_map() {
     let thinned = |mut map: Map| {
         let mut random = Random::new(9);
-        for shape in &mut map.shapes {
-            shape.vertices.retain(|_| random.symmetric(1.5).abs() < 1.0);
+        for polyline in &mut map.polylines {
+            polyline.vertices.retain(|_| random.symmetric(1.5).abs() < 1.0);
         }
-        Map::of(map.shapes)
+        Map::of(map.polylines)
     };
     assert_found(&Map::roads(), thinned, 0.03);
 }
@@ -166,9 +172,9 @@ fn lines_of_which_a_third_of_the_vertices_is_deleted_give_the_affine_map() {
 #[test]
 fn pieces_of_lines_give_the_affine_map() {
     let cut = |mut map: Map| {
-        map.shapes.iter_mut().for_each(|shape| shape.vertices.retain(|v| v[0] < 0.0));
-        map.shapes.retain(|shape| shape.vertices.len() > 1);
-        Map::of(map.shapes)
+        map.polylines.iter_mut().for_each(|polyline| polyline.vertices.retain(|v| v[0] < 0.0));
+        map.polylines.retain(|polyline| polyline.vertices.len() > 1);
+        Map::of(map.polylines)
     };
     assert_found(&Map::roads(), cut, 0.05);
 }
@@ -176,12 +182,12 @@ fn pieces_of_lines_give_the_affine_map() {
 #[test]
 fn points_give_the_affine_map_by_their_arrangement() {
     assert_found(&Map::trees(), |map| map, 0.01);
-    assert_found(&Map::fixture("kotka"), Map::without_shapes, 0.01);
+    assert_found(&Map::fixture("kotka"), Map::without_polylines, 0.01);
 }
 
 #[test]
 fn a_part_of_the_points_gives_a_similarity() {
-    let reference = Map::fixture("kotka").without_shapes();
+    let reference = Map::fixture("kotka").without_polylines();
     let middle = reference.vertices().centre();
     let there = Affine { coefficients: [0.6, 0.8, 1e5, 0.8, -0.6, 3e4] }; // rotated and mirrored
     let mut suspect = reference.shaken(0.15);
@@ -230,16 +236,16 @@ fn a_map_with_ten_times_the_vertices_is_registered_too() {
     let there = affine(1.0);
     let mut suspect = reference.shaken(0.15);
     let middle = |a: [f64; 2], b: [f64; 2], share: f64| [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
-    for shape in &mut suspect.shapes {
+    for polyline in &mut suspect.polylines {
         let mut dense = Vec::new();
-        let n = shape.vertices.len();
-        for i in 0..if shape.closed { n } else { n - 1 } {
-            let (a, b) = (shape.vertices[i], shape.vertices[(i + 1) % n]);
+        let n = polyline.vertices.len();
+        for i in 0..if polyline.closed { n } else { n - 1 } {
+            let (a, b) = (polyline.vertices[i], polyline.vertices[(i + 1) % n]);
             dense.extend((0..11).map(|k| middle(a, b, k as f64 / 11.0)));
         }
-        shape.vertices = dense;
+        polyline.vertices = dense;
     }
-    let suspect = Map::of(suspect.shapes);
+    let suspect = Map::of(suspect.polylines);
     assert!(suspect.vertices().len() > 10 * reference.vertices().len());
     let found = register(&reference, &suspect.moved(|p| there.apply(p)), Start::Geometry);
     let error_m = error_m(&reference, |p| there.apply(p), &found);
@@ -250,9 +256,9 @@ fn a_map_with_ten_times_the_vertices_is_registered_too() {
 fn nothing_is_found_where_there_is_nothing_to_find() {
     let reference = Map::fixture("kotka");
     let empty = Map::of(Vec::new());
-    let one = Map { points: vec![[1.0, 2.0]], shapes: Vec::new() };
-    let row = Map { points: (0..500).map(|i| [i as f64, 2.0 * i as f64]).collect(), shapes: Vec::new() };
-    let same = Map { points: vec![[1e9, 1e9]; 50], shapes: Vec::new() };
+    let one = Map { points: vec![[1.0, 2.0]], polylines: Vec::new() };
+    let row = Map { points: (0..500).map(|i| [i as f64, 2.0 * i as f64]).collect(), polylines: Vec::new() };
+    let same = Map { points: vec![[1e9, 1e9]; 50], polylines: Vec::new() };
     for suspect in [empty, one, row, same, Map::trees(), Map::roads()] {
         for start in [Start::Auto, Start::Geometry, Start::Landmarks, Start::None] {
             let found = register(&reference, &suspect, start);

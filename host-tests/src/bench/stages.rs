@@ -51,7 +51,7 @@ impl Stages {
         let (one_s, two_s) = (one_s?, two_s?);
         let (embed_s, _) = best_of_two(|| Ok(embed(&map.map()?, &key, &message, &parameters)?))?;
         Ok(Stages {
-            vertices: map.vertices.len(),
+            vertices: map.data.vertices.len(),
             patches: patches.as_slice().len(),
             read_s,
             cut_s,

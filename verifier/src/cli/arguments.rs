@@ -1,8 +1,9 @@
 //! Subcommands and their flags; those of the marking options are made from the one table.
 
-use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum};
 use meshmark_core::options::{OPTIONS, Spelling};
-use meshmark_verifier::{Demodulator, ExitCode, registration::Start};
+use meshmark_detection::{Demodulator, registration::Start};
+use meshmark_verifier::ExitCode;
 use std::path::PathBuf;
 
 const MARKING: &str = "Maps are marked by GDAL's ogr2ogr: ogr2ogr -f GPKG marked.gpkg MESHMARK:map.gpkg \
@@ -86,6 +87,48 @@ pub(super) struct CompareArgs {
     pub(super) report: Option<PathBuf>,
 }
 
+/// Where to start the registration.
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum StartArg {
+    /// As it stands, by landmarks or by geometry, whichever is best
+    Auto,
+    /// Features with the same attribute values
+    Landmarks,
+    /// Features of the same shape
+    Geometry,
+    /// Nowhere: the suspect is taken as it stands
+    None,
+}
+
+impl From<StartArg> for Start {
+    fn from(start: StartArg) -> Self {
+        match start {
+            StartArg::Auto => Start::Auto,
+            StartArg::Landmarks => Start::Landmarks,
+            StartArg::Geometry => Start::Geometry,
+            StartArg::None => Start::None,
+        }
+    }
+}
+
+/// How to demodulate.
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum DemodulatorArg {
+    /// The detector of Ohbuchi, Ueda and Endoh
+    Paper,
+    /// Least squares over the vertices that were found
+    Joint,
+}
+
+impl From<DemodulatorArg> for Demodulator {
+    fn from(demodulator: DemodulatorArg) -> Self {
+        match demodulator {
+            DemodulatorArg::Paper => Demodulator::Paper,
+            DemodulatorArg::Joint => Demodulator::Joint,
+        }
+    }
+}
+
 #[derive(Args)]
 pub(super) struct VerifyArgs {
     /// Key file made by `meshmark keygen`
@@ -108,10 +151,10 @@ pub(super) struct VerifyArgs {
     pub(super) landmark: Vec<String>,
     /// How to bring the suspect onto the reference
     #[arg(long, value_enum, default_value = "auto")]
-    pub(super) registration: Start,
+    pub(super) registration: StartArg,
     /// How to demodulate
     #[arg(long, value_enum, default_value = "joint")]
-    pub(super) demodulator: Demodulator,
+    pub(super) demodulator: DemodulatorArg,
     /// Radius within which vertices match, metres on the ground
     #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = positive, allow_negative_numbers = true)]
     pub(super) radius: f64,

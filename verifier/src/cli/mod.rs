@@ -9,18 +9,13 @@ use clap::{CommandFactory, Parser};
 use meshmark_core::{counted, key::SecretKey, options::Options};
 use meshmark_verifier::{
     Error, ExitCode, Result,
-    candidates::verify_candidates,
     compare::{Comparison, compare, detail::Compared},
-    distribute,
-    evidence::{self, Provenance},
-    evidence_map::Target,
-    html,
-    inputs::Inputs,
+    distribute, html,
+    inputs::{digests::Inputs, gdal_failures, texts},
     progress::Progress,
-    reading,
-    report::{Report, printable},
-    report_file::{Format, ReportFile},
-    verify,
+    report::{self, EvidenceMapFile, Format, Provenance, Report, ReportFile},
+    verify, verify_records,
+    words::printable,
 };
 use request::request;
 use std::{
@@ -30,7 +25,7 @@ use std::{
 
 /// Runs the command of this process.
 pub fn run() -> ExitCode {
-    reading::quieten_gdal();
+    gdal_failures::quieten_gdal();
     let result = match Cli::parse().command {
         Subcommands::Keygen { key_file } => keygen(&key_file),
         Subcommands::Verify(args) => run_verify(*args),
@@ -117,7 +112,7 @@ fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let request = distribute::Request {
         options: Options::parse(flags)?,
-        key: reading::key(&args.key)?,
+        key: texts::key(&args.key)?,
         map: args.map,
         recipients: args.recipients,
         folder: args.output_dir,
@@ -134,7 +129,7 @@ fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
 
 fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
-    let evidence_map = args.evidence_map.as_deref().map(Target::new).transpose()?;
+    let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     let wanted = args.explain || file.is_some();
     let inputs = wanted.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
     let (json, explain) = (args.json, args.explain);
@@ -142,7 +137,7 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut report = match &records {
-        Some(folder) => verify_candidates(&request, folder, &mut progress, &mut warn)?,
+        Some(folder) => verify_records(&request, folder, &mut progress, &mut warn)?,
         None => verify(&request, &mut progress)?,
     };
     if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
@@ -154,10 +149,16 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
     let inputs = inputs.with_record(record.or_else(best).as_deref())?;
     if explain {
-        print(&format!("\n{}", inputs.explain(&report)))?;
+        print(&format!("\n{}", report::explain(&inputs, &report)))?;
     }
     if let Some(file) = file {
-        let provenance = Provenance::new(&report, inputs, command_line());
+        let provenance = Provenance {
+            inputs,
+            reference_vertices_sha256: report.reference_digest.clone(),
+            suspect_crs: report.suspect_crs.clone(),
+            command: command_line(),
+            versions: report::versions(),
+        };
         let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
         file.write(&match file.format() {
             Format::Html => html::verification(&report),
@@ -169,5 +170,5 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
 
 /// That of this process.
 fn command_line() -> String {
-    evidence::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
+    report::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }

@@ -6,12 +6,12 @@ use meshmark_core::{
     options::{Options, Spelling, Subject},
     record::Record,
 };
-use meshmark_verifier::{Error, Request, Result, reading, verify::check_key};
+use meshmark_verifier::{Error, Request, Result, inputs::texts, verify::check_key};
 
 /// Puts key, record and flags together.
 pub(super) fn request(args: VerifyArgs) -> Result<Request> {
-    let key = reading::key(&args.key)?;
-    let record = args.record.as_deref().map(reading::record).transpose()?;
+    let key = texts::key(&args.key)?;
+    let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let options = Options::parse(flags)?;
     let options = match &record {
@@ -33,8 +33,8 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         layers: options.layers,
         srs: options.srs,
         landmarks: args.landmark,
-        registration: args.registration,
-        demodulator: args.demodulator,
+        registration: args.registration.into(),
+        demodulator: args.demodulator.into(),
         radius_m: args.radius,
         significance: args.significance,
         sketch: args.report.is_some(),

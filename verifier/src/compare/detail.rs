@@ -2,11 +2,11 @@
 
 use crate::{
     Result,
-    histogram::Histogram,
-    inputs::{Digested, digest},
-    sketch::{ARROWS, BINS, Extent, Thinning, lines},
+    inputs::digests::{Digested, digest},
+    report::sketch::{ARROWS, BINS, Extent, Thinning, lines},
 };
 use meshmark_core::{distortion::Corner, scale::Measure, vertices::VertexTable};
+use meshmark_detection::Histogram;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
@@ -73,7 +73,7 @@ impl Compared {
     /// # Errors
     /// One of them cannot be read to its end.
     pub fn read(reference: &Path, marked: &Path, command: String) -> Result<Self> {
-        let versions = crate::evidence::versions();
+        let versions = crate::report::versions();
         Ok(Compared { reference: digest(reference)?, marked: digest(marked)?, command, versions })
     }
 }

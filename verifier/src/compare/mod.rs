@@ -7,7 +7,7 @@ mod crossings;
 pub mod detail;
 mod text;
 
-use crate::{Error, Result, reading};
+use crate::{Error, Result, inputs::maps};
 use detail::{Detail, Findings};
 use meshmark_core::{
     counted,
@@ -100,10 +100,10 @@ pub fn compare(
     precision: Option<f64>,
     detailed: bool,
 ) -> Result<Comparison> {
-    let (ground, lattice) = reading::scales(reference, layers)?;
+    let (ground, lattice) = maps::scales(reference, layers)?;
     let measure = Measure { ground, lattice: lattice.as_ref() };
-    let (before, own) = reading::geometries("reference", reference, layers)?;
-    let (after, other) = reading::geometries("marked map", marked, layers)?;
+    let (before, own) = maps::geometries("reference", reference, layers)?;
+    let (after, other) = maps::geometries("marked map", marked, layers)?;
     if before.len() != after.len() {
         let (b, a) = (before.len(), after.len());
         return Err(Error::Usage(format!(

@@ -4,7 +4,7 @@
 //! (flatgeobuf.org/src/fbs). The index is a packed R-tree: nodes of a box and a place, level by level, the root first.
 
 use super::plain::changed;
-use crate::{Error, Result, reading};
+use crate::{Error, Result, inputs::gdal_failures};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_dataset::{marking::Moves, workplace::file_error};
 use std::{fs, ops::Range, path::Path};
@@ -66,9 +66,9 @@ fn strange() -> Error {
 
 /// The boxes of all features in the order of the file. GDAL knows how far an arc reaches.
 fn boxes(file: &Path) -> Result<Vec<Bounds>> {
-    reading::forget_failure();
+    gdal_failures::forget_failure();
     let failed = |error: gdal::errors::GdalError| {
-        Error::Usage(reading::last_failure().unwrap_or_else(|| error.to_string()))
+        Error::Usage(gdal_failures::last_failure().unwrap_or_else(|| error.to_string()))
     };
     let dataset = Dataset::open(file).map_err(failed)?;
     let mut layer = dataset.layer(0).map_err(failed)?;

@@ -20,7 +20,7 @@ mod staged;
 mod staging;
 mod writing;
 
-use crate::{Error, Result, progress::Progress, reading};
+use crate::{Error, Result, inputs::maps, progress::Progress};
 use copies::Copy;
 use meshmark_core::{
     embedding::Embedding,
@@ -95,7 +95,7 @@ pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnM
     let made = make_folder(folder)?;
     let done = Workplace::new(folder).map_err(Error::from).and_then(|workplace| {
         progress.start("reading", 0);
-        let (dataset, map) = reading::source(&request.map, options, warn)?;
+        let (dataset, map) = maps::source(&request.map, options, warn)?;
         let mut copies: Vec<Copy> =
             recipients.into_iter().map(|recipient| Copy::new(recipient, folder, format)).collect();
         let all = copies.len();
@@ -137,7 +137,7 @@ fn run(
     warn: &mut dyn FnMut(&str),
 ) -> Result<()> {
     let Request { key, options, folder, .. } = request;
-    let of_map = |error| reading::failed("map", &request.map, error);
+    let of_map = |error| maps::failed("map", &request.map, error);
     let map = survey.map().map_err(of_map)?;
     let parameters = &options.parameters;
     marking::check_extent(&map, parameters).map_err(of_map)?;
@@ -153,7 +153,7 @@ fn run(
     let reference = marking::reference(survey, embedding.patches());
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
     let unmarked = pool.install(|| Unmarked::new(geometries, &map));
-    let vertices = &survey.vertices;
+    let vertices = &survey.data.vertices;
     let warnings = Mutex::default();
     let job = Job { key, options, vertices, unmarked, reference, format, stage, folder, warnings };
     let mut written = 0;

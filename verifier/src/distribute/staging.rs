@@ -3,10 +3,9 @@
 use super::{
     Request, ogr2ogr,
     plain::{Plain, changed},
-    reading,
     staged::Staged,
 };
-use crate::{Error, Result};
+use crate::{Error, Result, inputs::maps};
 use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Layer, LayerAccess, LayerOptions},
@@ -44,13 +43,13 @@ impl Stage {
         let (staged, plain) = if format.driver == "GPKG" {
             let options = ["-lco", "SPATIAL_INDEX=YES"];
             ogr2ogr::copy("GPKG", &request.map, &path, &options)?.iter().for_each(|text| warn(text));
-            (Staged::read(path, &map.vertices, marks)?, None)
+            (Staged::read(path, &map.data.vertices, marks)?, None)
         } else {
             let plain = Plain::new(&request.map, &workplace.subfolder("plain")?, format, warn)?;
-            let failed = |error| reading::failed("map", &request.map, error);
+            let failed = |error| maps::failed("map", &request.map, error);
             copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path)
                 .map_err(|error| Error::Usage(format!("writing {} failed: {error}", path.display())))?;
-            (Staged::read(path, &map.vertices, |_| true)?, Some(plain))
+            (Staged::read(path, &map.data.vertices, |_| true)?, Some(plain))
         };
         let geometries = map.geometries.as_ref().expect("the map was read with them");
         let staged_geometries: usize = staged.layers.iter().map(|layer| layer.fids.len()).sum();

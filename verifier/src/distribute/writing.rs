@@ -3,7 +3,7 @@
 use super::{Job, copies::Copy, moving};
 use crate::{
     Error, Result,
-    reading::{forget_failure, last_failure},
+    inputs::gdal_failures::{forget_failure, last_failure},
 };
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::record::Distortion;

@@ -1,11 +1,9 @@
 //! Histograms.
 
 use super::{count, figure, frame::rounded, section};
-use crate::{
-    histogram::{Histogram, round_up},
-    report::Report,
-};
+use crate::report::Report;
 use maud::{Markup, html};
+use meshmark_detection::{Histogram, round_up};
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 480.0;

@@ -2,15 +2,13 @@
 
 use super::{count, section, table, words};
 use crate::{
-    candidates::Candidates,
-    decision::Verdict,
-    evidence::Provenance,
-    explain,
-    inputs::Digested,
-    report::{Report, clipped, printable},
+    inputs::digests::Digested,
+    report::{Candidates, Provenance, Report, explain},
+    words::{clipped, printable},
 };
 use maud::{Markup, html};
 use meshmark_core::{counted, options::join_list};
+use meshmark_detection::decision::Verdict;
 
 pub fn compared(report: &Report) -> Markup {
     let content = html! {

@@ -7,14 +7,12 @@ use super::{
     map::{Arrows, marks},
     page, section, table,
 };
-use crate::{
-    compare::{
-        Comparison,
-        detail::{Compared, Detail, NOTABLE_DEG, Topology},
-    },
-    histogram::Histogram,
+use crate::compare::{
+    Comparison,
+    detail::{Compared, Detail, NOTABLE_DEG, Topology},
 };
 use maud::{Markup, html};
+use meshmark_detection::Histogram;
 use std::fmt::Write as _;
 
 /// Degrees from which a cell is of a class.
@@ -106,8 +104,9 @@ fn percent(share: f64, decimals: usize) -> String {
 }
 
 fn files(provenance: &Compared) -> Markup {
-    let file =
-        |file: &crate::inputs::Digested| Some(html! { b { (file.path) } br; span.digest { (file.digest) } });
+    let file = |file: &crate::inputs::digests::Digested| {
+        Some(html! { b { (file.path) } br; span.digest { (file.digest) } })
+    };
     section(
         "What was compared",
         &html! {

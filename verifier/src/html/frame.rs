@@ -1,7 +1,8 @@
 //! From CRS units to the page: whole numbers, 4000 along the longer side.
 
-use crate::{histogram::round_up, sketch::Extent};
+use crate::report::sketch::Extent;
 use maud::{Markup, html};
+use meshmark_detection::round_up;
 use std::fmt::Write as _;
 
 const SIDE: f64 = 4000.0;

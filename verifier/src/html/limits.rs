@@ -1,15 +1,16 @@
 //! What the finding does not say, what would weaken it, what makes it evidence, and how to repeat it.
 
 use super::{count, counted, section};
-use crate::{decision::Verdict, explain, report::Report};
+use crate::report::{Report, explain};
 use maud::{Markup, html};
+use meshmark_detection::decision::Verdict;
 
 pub fn limits(report: &Report) -> Markup {
     html! {
         (section("What was not tested", &list(&explain::NOT_TESTED.map(String::from))))
         (section("What would weaken this finding", &list(&weaknesses(report))))
         @if let Some(provenance) = &report.provenance {
-            @let deposit = provenance.inputs.deposit(report, provenance.inputs.record.as_ref());
+            @let deposit = explain::deposit(&provenance.inputs, report);
             (section("What makes this evidence", &html! {
                 p { (deposit[0]) " " (deposit[1]) }
                 ul { @for text in &deposit[2..] { li.digest { (text) } } }

@@ -5,8 +5,9 @@ use super::{
     frame::{Frame, largest_below, metres},
     section,
 };
-use crate::{decision::Verdict, evidence::Evidence, report::Report, sketch::PatchPlace};
+use crate::report::{Evidence, Report, sketch::PatchPlace};
 use maud::{Markup, html};
+use meshmark_detection::decision::Verdict;
 use std::fmt::Write as _;
 
 /// With more patches their scores are no longer readable.

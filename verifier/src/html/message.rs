@@ -1,7 +1,7 @@
 //! The message bit by bit, with how sure each bit is.
 
 use super::{count, figure, section, sentence};
-use crate::report::{Report, certainty};
+use crate::report::{Report, text::certainty};
 use maud::{Markup, html};
 
 /// Bits in a row.

@@ -1,8 +1,9 @@
 //! How the suspect was brought onto the reference, and what was left.
 
 use super::{chart::Chart, count, figure, section, sentence, table};
-use crate::{decision::Verdict, evidence::Evidence, explain, report::Report};
+use crate::report::{Evidence, Report, explain};
 use maud::{Markup, html};
+use meshmark_detection::decision::Verdict;
 
 pub fn registration(report: &Report) -> Markup {
     let r = &report.registration;

@@ -2,10 +2,11 @@
 
 use super::{count, words};
 use crate::{
-    decision::Verdict,
-    report::{Report, clipped, printable},
+    report::Report,
+    words::{clipped, printable},
 };
 use maud::{Markup, html};
+use meshmark_detection::decision::Verdict;
 
 pub fn verdict(report: &Report) -> Markup {
     let class = match report.verdict {

@@ -1,0 +1,325 @@
+//! The decision: two questions, two null hypotheses.
+//!
+//! *Was this key used?* Under another key the chips are independent random signs. Given the suspect,
+//! the sum Σ p_i b′_i a_i then has mean 0 and variance Σ a_i², whatever happened to the map, so the score is
+//! standard normal (a sum of thousands of independent signs; its tail is at most 3.18 times the normal
+//! one, Bentkus and Dzindzalieta 2015). *Is it this recipient?* Under the right key, an unrelated
+//! recipient has a random message: Σ w_j b′_j b̂_j over the channel bits has mean 0 and variance |w b̂|². With
+//! `CODE=LDPC` b′ is a random code word, not independent signs: any four of its bits are independent, and over random
+//! messages the tail is that of the normal distribution (tests of core's `demodulation.rs`). A message that the key
+//! did not whiten is no random one, and any other message is a null hypothesis too: [`Null`]. The largest p counts.
+
+mod decoys;
+mod rivals;
+mod survival;
+
+pub use decoys::Decoys;
+
+use meshmark_core::{
+    demodulation::Demodulation,
+    key::SecretKey,
+    message::{LEAST_IDENTIFYING_BITS, Message},
+    options::Subject,
+};
+use serde::Serialize;
+
+/// What the copy of somebody else carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Null {
+    /// A random message: those of recipients are keyed hashes, and the key whitens others.
+    RandomMessage,
+    /// Any other message, also one that differs in a single bit: messages that were not whitened.
+    AnyOtherMessage,
+}
+
+/// The bits that the code is expected to carry, and what it carries otherwise.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// The bits.
+    pub carried: Message,
+    /// The null hypothesis.
+    pub null: Null,
+}
+
+impl Expected {
+    /// Those of a subject under a key.
+    pub fn new(subject: &Subject, key: &SecretKey) -> Self {
+        let null = match subject {
+            Subject::Unwhitened(_) => Null::AnyOtherMessage,
+            Subject::Recipient(_) | Subject::Message(_) => Null::RandomMessage,
+        };
+        Expected { carried: subject.carried(key), null }
+    }
+}
+
+/// A suspect may be called unmarked when a mark would show this many standard deviations above what
+/// significance needs.
+const POWER_MARGIN: f64 = 3.0;
+
+/// The weights of the bits cost this share of the largest score of a recipient, √n for n channel bits.
+const MOST_OF_ROOT: f64 = 0.99;
+
+/// What a verdict is about: under any other of these the mark is another one.
+const MARK: &str = "a mark with this key, message, options and reference";
+
+/// The answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// This mark is in the suspect.
+    Match,
+    /// It is not, and it would have shown.
+    NoMatch,
+    /// The suspect cannot tell.
+    Inconclusive,
+}
+
+/// The answer and its grounds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decision {
+    /// The answer.
+    pub verdict: Verdict,
+    /// One sentence why.
+    pub reason: String,
+    /// log₁₀ of the probability of this much evidence under a random key.
+    pub p_mark_log10: Option<f64>,
+    /// log₁₀ of the probability of this much agreement under the null hypothesis about the message.
+    pub p_recipient_log10: Option<f64>,
+    /// How many messages were tried.
+    pub tried: usize,
+}
+
+impl Decision {
+    /// The larger of the two, times the number of messages tried (Bonferroni).
+    pub fn p_value_log10(&self) -> Option<f64> {
+        let larger = self.p_mark_log10?.max(self.p_recipient_log10?);
+        Some((larger + (self.tried as f64).log10()).min(0.0))
+    }
+
+    /// No answer, for there is nothing to compare the decoded message with.
+    pub fn without_message() -> Self {
+        Self::inconclusive(
+            "no expected message was given, so there is nothing to compare the decoded one with".into(),
+        )
+    }
+
+    /// No answer, for a reason found before demodulation.
+    pub fn inconclusive(reason: String) -> Self {
+        let (p_mark_log10, p_recipient_log10) = (None, None);
+        Decision { verdict: Verdict::Inconclusive, reason, p_mark_log10, p_recipient_log10, tried: 1 }
+    }
+}
+
+/// Weighs a demodulation against the expected message, one of those that are tried.
+pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, significance: f64) -> Decision {
+    let message = &expected.carried;
+    let each = significance / tried as f64; // Bonferroni
+    let bits = message.len();
+    let p_mark = survival::normal_log10(found.mark_score(message));
+    // A message of m bits cannot be hit less often than once in 2^m.
+    let least = -(bits as f64) * 2f64.log10();
+    let p_random = survival::normal_log10(found.recipient_score(message)).max(least);
+    // The score of a message of which every bit is read alike, but for the weights.
+    let channel_bits = found.estimate.len() as f64;
+    let best = survival::normal_log10(MOST_OF_ROOT * channel_bits.sqrt()).max(least);
+    let among_rivals = match expected.null {
+        Null::RandomMessage => None,
+        Null::AnyOtherMessage => Some(rivals::standing(found, message)),
+    };
+    let p_recipient = among_rivals.map_or(p_random, |standing| p_random.max(standing.p_log10));
+    let is_mixed = among_rivals.is_some_and(|standing| standing.is_mixed);
+    let fits = |p_message: f64| p_mark.max(p_message) < each.log10();
+    let (verdict, reason) = if bits < LEAST_IDENTIFYING_BITS {
+        let reason = format!(
+            "a message of {bits} bits cannot identify anyone: mark with {LEAST_IDENTIFYING_BITS} or more"
+        );
+        (Verdict::Inconclusive, reason)
+    } else if best >= each.log10() {
+        let among = if tried > 1 { format!(" for each of {tried} that were tried") } else { String::new() };
+        let reason = format!(
+            "a message of {bits} bits, read without an error, has a p-value of 10^{best:.1}, and a significance of \
+             {each:.1e}{among} asks for less: give a larger one, or mark with more bits"
+        );
+        (Verdict::Inconclusive, reason)
+    } else if fits(p_recipient) && is_mixed {
+        let reason = "some bits of the message are much weaker than the rest, as if copies with other messages were \
+                      mixed: a message that was not whitened then names nobody";
+        (Verdict::Inconclusive, reason.into())
+    } else if fits(p_recipient) {
+        let reason = format!(
+            "the probability that this key and message fit so well by chance is below the significance of \
+             {significance:e}"
+        );
+        (Verdict::Match, reason)
+    } else if fits(p_random) {
+        another_message(found, each)
+    } else {
+        unseen(found, bits, each)
+    };
+    Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient), tried }
+}
+
+/// The key is there, and some other message explains the suspect as well or better.
+fn another_message(found: &Demodulation, each: f64) -> (Verdict, String) {
+    let decoded = found.message();
+    let standing = rivals::standing(found, &decoded);
+    match standing.p_log10 < each.log10() && !standing.is_mixed {
+        true => (
+            Verdict::NoMatch,
+            format!("a mark of this key is there, and it carries another message, {}", decoded.to_hex()),
+        ),
+        false => (
+            Verdict::Inconclusive,
+            "a mark of this key is there, but a message that differs in few bits explains it as well, and a message \
+             that was not whitened names nobody then"
+                .into(),
+        ),
+    }
+}
+
+/// log₁₀ of the probability of this much evidence for any message at all under a random key; `None` where
+/// nothing was observed to move. Few chips may carry a bit, but the even moments of sums of random signs are
+/// at most those of normal variables, so Chernoff's bound on chi-squared holds for them however few.
+pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64> {
+    let (score, degrees) = found.key_score(chip_rate);
+    (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
+}
+
+/// No mark is seen: would a full one be expected to pass both tests, that of the key with a margin?
+fn unseen(found: &Demodulation, bits: usize, significance: f64) -> (Verdict, String) {
+    let needed = (-2.0 * significance.ln()).sqrt(); // above the normal quantile
+    if (found.estimate.len() as f64).sqrt() <= needed {
+        let reason = format!(
+            "a message of {bits} bits is too short for its absence to show at a significance of {significance:.1e}: give \
+             a larger one, or mark with {} bits or more",
+            (needed * needed) as usize + 1
+        );
+        return (Verdict::Inconclusive, reason);
+    }
+    // Were the mark there, b̂ would be near ±1 on the channel bits that are known at all.
+    let known: f64 = found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum();
+    // In the untouched reference nothing moved, so there is no noise either to measure a mark against.
+    let nothing_moved = found.expected_sum > 0.0 && found.chip_correlations.iter().all(|a| *a == 0.0);
+    let visible = nothing_moved || found.expected_mark_score() > needed + POWER_MARGIN;
+    match visible && known.sqrt() > needed {
+        true => (Verdict::NoMatch, format!("{MARK} would have shown, and it does not")),
+        false => {
+            (Verdict::Inconclusive, format!("too few vertices match, or too roughly, for {MARK} to show"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use meshmark_core::code::Code;
+
+    fn random(message: &Message) -> Expected {
+        Expected { carried: message.clone(), null: Null::RandomMessage }
+    }
+
+    fn evidence(estimate: Vec<f64>, scores: Vec<f64>) -> Demodulation {
+        Demodulation {
+            code: Code::Repetition,
+            variance: vec![0.1; estimate.len()],
+            estimate,
+            scores,
+            chip_correlations: vec![1.0; 10_000], // null deviation 100
+            expected_sum: 5000.0,
+            noise_m: 0.1,
+        }
+    }
+
+    #[test]
+    fn the_right_key_alone_is_no_match_for_another_recipient() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let other = Message::from_hex("5a5a5a5a0f0f0f0f3c3c3c3c12345678").unwrap();
+        let scores: Vec<f64> = message.signs().iter().map(|b| 40.0 * b).collect();
+        let found = evidence(message.signs(), scores);
+        let right = decide_among(&found, &random(&message), 1, 1e-6);
+        assert_eq!(right.verdict, Verdict::Match);
+        assert!(right.p_recipient_log10.unwrap() >= -38.6, "not below 2^-128");
+        assert_eq!(decide_among(&found, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
+    }
+
+    #[test]
+    fn a_short_message_is_inconclusive() {
+        let message = Message::from_hex("a5").unwrap();
+        let found = evidence(message.signs(), message.signs().iter().map(|b| 1e4 * b).collect());
+        assert_eq!(decide_among(&found, &random(&message), 1, 0.1).verdict, Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_significance_that_no_message_of_these_bits_reaches_is_inconclusive_and_says_so() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let found = evidence(message.signs(), message.signs().iter().map(|b| 40.0 * b).collect());
+        let asked = decide_among(&found, &random(&message), 1, 1e-60);
+        assert_eq!(asked.verdict, Verdict::Inconclusive);
+        assert!(
+            asked.reason.contains("a p-value of 10^-28.7") && asked.reason.contains("1.0e-60"),
+            "{}",
+            asked.reason
+        );
+        let short = Message::from_hex("0a1b2c").unwrap();
+        let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
+        assert_eq!(decide_among(&found, &random(&short), 1, 1e-6).verdict, Verdict::Match);
+        let among = decide_among(&found, &random(&short), 17, 1e-6);
+        assert!(among.reason.contains("for each of 17 that were tried"), "{}", among.reason);
+    }
+
+    #[test]
+    fn a_message_too_short_to_be_absent_is_inconclusive_and_says_so() {
+        let (short, other) = (Message::from_hex("0a1b2c").unwrap(), Message::from_hex("f5e4d3").unwrap());
+        let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
+        let decision = decide_among(&found, &random(&other), 1, 1e-6);
+        assert_eq!(decision.verdict, Verdict::Inconclusive);
+        assert!(
+            decision.reason.contains("24 bits is too short") && decision.reason.contains("28 bits or more")
+        );
+        let [long, other] = ["0a1b2c3d", "f5e4d3c2"].map(|hex| Message::from_hex(hex).unwrap());
+        let found = evidence(long.signs(), long.signs().iter().map(|b| 400.0 * b).collect());
+        assert_eq!(decide_among(&found, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
+    }
+
+    #[test]
+    fn the_p_value_is_that_of_all_messages_tried() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let scores: Vec<f64> = message.signs().iter().map(|b| 4.5 * b).collect(); // 5.76 deviations
+        let found = evidence(message.signs(), scores);
+        let alone = decide_among(&found, &random(&message), 1, 1e-6);
+        let among = decide_among(&found, &random(&message), 1000, 1e-6);
+        assert!((alone.p_value_log10().unwrap() + 3.0 - among.p_value_log10().unwrap()).abs() < 1e-12);
+        assert_eq!((alone.verdict, among.verdict), (Verdict::Match, Verdict::NoMatch));
+        assert_eq!(decide_among(&found, &random(&message), 1 << 60, 0.5).p_value_log10(), Some(0.0));
+    }
+
+    #[test]
+    fn the_untouched_reference_is_no_match() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let untouched =
+            Demodulation { chip_correlations: vec![0.0; 512], ..evidence(vec![0.0; 128], vec![0.0; 128]) };
+        assert_eq!(decide_among(&untouched, &random(&message), 1, 1e-6).verdict, Verdict::NoMatch);
+    }
+
+    #[test]
+    fn a_suspect_in_which_a_mark_could_not_show_is_inconclusive() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let weak = Demodulation { expected_sum: 200.0, ..evidence(vec![0.01; 128], vec![0.1; 128]) };
+        assert_eq!(decide_among(&weak, &random(&message), 1, 1e-6).verdict, Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_serial_number_that_was_not_whitened_matches_its_own_copy_alone() {
+        let [one, two] = [1, 2].map(|n| Message::from_hex(&format!("{n:032x}")).unwrap());
+        let found = evidence(one.signs(), one.signs().iter().map(|b| 40.0 * b).collect());
+        let of = |message: &Message, null| {
+            decide_among(&found, &Expected { carried: message.clone(), null }, 1, 1e-6)
+        };
+        assert_eq!(of(&one, Null::AnyOtherMessage).verdict, Verdict::Match);
+        let neighbour = of(&two, Null::AnyOtherMessage);
+        assert_eq!(neighbour.verdict, Verdict::NoMatch);
+        assert!(neighbour.p_value_log10().unwrap() > -1.0, "its null hypothesis holds: {neighbour:?}");
+        assert_eq!(of(&two, Null::RandomMessage).verdict, Verdict::Match, "which is what whitening is for");
+    }
+}

@@ -1,0 +1,163 @@
+//! An examination, as values that are passed on: a [`Reference`] and a suspect that was registered are [`Matched`], what
+//! matched is [`Demodulated`], and what was demodulated is decided on (module [`crate::decision`]).
+
+use crate::{
+    decision::Decoys,
+    matching::{Matcher, Matches, is_chance, out_of_place},
+    progress::{Listener, Progress},
+    registration::Registration,
+    tracking::{Followed, Tracking},
+};
+use meshmark_core::{
+    Result,
+    carrier::Carrier,
+    deformation::Deformation,
+    demodulation::{self, Demodulation},
+    ground::Ground,
+    key::SecretKey,
+    map::Map,
+    map_data::MapData,
+    options::Parameters,
+    patches::Patches,
+};
+
+/// Which of core's demodulators to use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Demodulator {
+    /// The detector of Ohbuchi, Ueda and Endoh.
+    Paper,
+    /// Least squares over the vertices that were found.
+    Joint,
+}
+
+/// What the mark in question is made with, but for its message.
+#[derive(Clone, Copy)]
+pub struct Mark<'a> {
+    /// The secret key.
+    pub key: &'a SecretKey,
+    /// Bits of the message.
+    pub bits: usize,
+    /// The numbers that shape the mark.
+    pub parameters: &'a Parameters,
+}
+
+/// The map before it was marked.
+pub struct Reference<'a> {
+    /// Its numbers.
+    pub data: &'a MapData,
+    /// Metres on the ground, as the mark has them.
+    pub ground: Ground,
+    /// The patches of its mesh.
+    pub patches: Patches,
+    /// Coefficients of a patch and axis that carry the message.
+    carriers: usize,
+}
+
+impl<'a> Reference<'a> {
+    /// Meshes and cuts a map; `map` is `data` on the ground.
+    ///
+    /// # Errors
+    /// A mark of this kind does not fit the map.
+    pub fn new(data: &'a MapData, map: &Map, bits: usize, parameters: &Parameters) -> Result<Self> {
+        let patches = Patches::new(map, parameters)?;
+        let carriers = patches.carriers(bits, parameters)?;
+        Ok(Reference { data, ground: map.ground, patches, carriers })
+    }
+}
+
+/// A suspect on its reference.
+pub struct Matched<'a> {
+    /// The reference.
+    pub reference: &'a Reference<'a>,
+    /// The suspect, in the CRS of the reference.
+    pub suspect: &'a MapData,
+    /// Vertices of the suspect where the registration puts them, CRS units.
+    pub moved: Vec<[f64; 2]>,
+    /// Which vertex is which.
+    pub matches: Matches,
+    /// How many vertices match a suspect that is certainly not in place.
+    pub by_chance: usize,
+}
+
+impl<'a> Matched<'a> {
+    /// Matches the vertices of a suspect within `radius_m`.
+    pub fn new(
+        reference: &'a Reference<'a>,
+        suspect: &'a MapData,
+        registration: &Registration,
+        radius_m: f64,
+    ) -> Self {
+        let (ground, vertices) = (&reference.ground, &reference.data.vertices);
+        let moved = registration.apply(suspect.vertices.coords());
+        let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
+        let matches = matcher.all(&moved, radius_m);
+        let [x, y] = out_of_place(ground.metres_per_unit(vertices.centre()), radius_m);
+        let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
+        let by_chance = matcher.all(&shifted, radius_m).count;
+        Matched { reference, suspect, moved, matches, by_chance }
+    }
+
+    /// Whether no more vertices match than chance makes: nothing can be demodulated.
+    pub fn is_chance(&self) -> bool {
+        is_chance(self.matches.count, self.by_chance)
+    }
+
+    /// Demodulates with a key. The paper's demodulator takes the matches as they are; the joint one follows a
+    /// deformation first, which changes them.
+    ///
+    /// # Errors
+    /// Those of the demodulation.
+    pub fn demodulate(
+        &self,
+        mark: Mark,
+        demodulator: Demodulator,
+        radius_m: f64,
+        listener: Listener,
+    ) -> Result<Demodulated> {
+        let Mark { key, bits, parameters } = mark;
+        let (patches, carrier) = (&self.reference.patches, Carrier::new(key));
+        let (stage, steps) = ("demodulation", patches.as_slice().len() as u64);
+        let step = |steps| listener(Progress::Steps(steps));
+        if demodulator == Demodulator::Paper {
+            listener(Progress::Stage { stage, steps });
+            let (coords, ground) = (self.reference.data.vertices.coords(), &self.reference.ground);
+            let observed = self.matches.displacements_m(coords, &self.moved, ground);
+            let found = demodulation::paper(patches, &carrier, &observed, bits, parameters, &step)?;
+            let weights = vec![1.0; observed.len()];
+            return Ok(self.demodulated(found, self.matches.clone(), None, weights));
+        }
+        listener(Progress::Stage { stage: "deformation", steps: 0 });
+        let maps = (self.reference.data, self.suspect);
+        let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
+        let Followed { matches, observed, disturbance } =
+            tracking.follow(self.reference.carriers, parameters, radius_m)?;
+        listener(Progress::Stage { stage, steps });
+        let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
+        Ok(self.demodulated(found, matches, Some(disturbance.deformation), disturbance.weights))
+    }
+
+    fn demodulated(
+        &self,
+        found: Demodulation,
+        matches: Matches,
+        deformation: Option<Deformation>,
+        weights: Vec<f64>,
+    ) -> Demodulated {
+        let decoys = Decoys::new(&found, &self.suspect.vertices, &self.reference.data.vertices);
+        Demodulated { found, matches, deformation, weights, decoys }
+    }
+}
+
+/// What a suspect says under one key.
+pub struct Demodulated {
+    /// The evidence.
+    pub found: Demodulation,
+    /// Which vertex is which, after a deformation was followed.
+    pub matches: Matches,
+    /// The deformation that was estimated; none by the demodulator of the paper.
+    pub deformation: Option<Deformation>,
+    /// Of every reference vertex: 1, or less where its displacement does not fit in with the others.
+    pub weights: Vec<f64>,
+    /// How decoy keys score; none where nothing moved.
+    pub decoys: Option<Decoys>,
+}

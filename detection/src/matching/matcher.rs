@@ -1,0 +1,146 @@
+//! Nearest neighbours, mutually, within the radius t (paper, section 3.5).
+
+use super::{
+    joined::{self, Candidate, Graph},
+    matches::Matches,
+};
+use meshmark_core::ground::Ground;
+use rayon::prelude::*;
+use rstar::{AABB, PointDistance, RTree, RTreeObject};
+
+/// Finds reference vertices and suspect vertices that are each other's nearest within a radius.
+pub struct Matcher<'a> {
+    reference: &'a [[f64; 2]],
+    ground: &'a Ground,
+    /// Subtracted from coordinates, then x is multiplied by `x_scale`: the plane distances are taken in.
+    origin: [f64; 2],
+    x_scale: f64,
+    tree: RTree<Node>,
+}
+
+#[derive(Clone, Copy)]
+struct Node {
+    at: [f64; 2],
+    index: u32,
+}
+
+impl RTreeObject for Node {
+    type Envelope = AABB<[f64; 2]>;
+    fn envelope(&self) -> Self::Envelope {
+        AABB::from_point(self.at)
+    }
+}
+
+impl PointDistance for Node {
+    fn distance_2(&self, p: &[f64; 2]) -> f64 {
+        (self.at[0] - p[0]).powi(2) + (self.at[1] - p[1]).powi(2)
+    }
+}
+
+impl<'a> Matcher<'a> {
+    /// `reference`: vertices in CRS units; `centre`: the middle of the map.
+    pub fn new(reference: &'a [[f64; 2]], ground: &'a Ground, centre: [f64; 2]) -> Self {
+        let mut matcher = Matcher {
+            reference,
+            ground,
+            origin: centre,
+            x_scale: ground.x_scale(centre[1]),
+            tree: RTree::new(),
+        };
+        matcher.tree = matcher.tree_of(reference);
+        matcher
+    }
+
+    /// Matches every reference vertex. `suspect`: vertices in the reference's CRS; `radius_m`: metres.
+    pub fn all(&self, suspect: &[[f64; 2]], radius_m: f64) -> Matches {
+        self.every(1, suspect, radius_m)
+    }
+
+    /// Matches every `step`-th reference vertex.
+    pub fn every(&self, step: usize, suspect: &[[f64; 2]], radius_m: f64) -> Matches {
+        self.mutual(step, suspect, &self.tree_of(suspect), radius_m)
+    }
+
+    /// Matches every reference vertex, and where several suspect vertices are near chooses by what they are
+    /// joined to. `graphs`: of the reference and of the suspect.
+    pub fn joined(&self, suspect: &[[f64; 2]], radius_m: f64, graphs: [&Graph; 2]) -> Matches {
+        let tree = self.tree_of(suspect);
+        let nearest = self.mutual(1, suspect, &tree, radius_m);
+        let near = |reference: u32| {
+            let within = self.within(&tree, self.reference[reference as usize], radius_m);
+            within.map(move |(distance_m, suspect)| Candidate { reference, suspect, distance_m })
+        };
+        let candidates: Vec<Candidate> =
+            (0..self.reference.len() as u32).into_par_iter().flat_map_iter(near).collect();
+        joined::choose(nearest, &candidates, graphs[0], graphs[1])
+    }
+
+    fn mutual(&self, step: usize, suspect: &[[f64; 2]], tree: &RTree<Node>, radius_m: f64) -> Matches {
+        let mutual = |i: usize| {
+            if !i.is_multiple_of(step) {
+                return None;
+            }
+            let there = self.nearest(tree, self.reference[i], radius_m)?;
+            let back = self.nearest(&self.tree, suspect[there as usize], radius_m)?;
+            (back as usize == i).then_some(there)
+        };
+        let suspect_of: Vec<Option<u32>> = (0..self.reference.len()).into_par_iter().map(mutual).collect();
+        Matches { count: suspect_of.iter().flatten().count(), suspect_of }
+    }
+
+    fn tree_of(&self, points: &[[f64; 2]]) -> RTree<Node> {
+        let node = |(i, p): (usize, &[f64; 2])| Node { at: self.plane(*p), index: i as u32 };
+        RTree::bulk_load(points.iter().enumerate().map(node).collect())
+    }
+
+    fn plane(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [(x - self.origin[0]) * self.x_scale, y - self.origin[1]]
+    }
+
+    /// The point of `tree` nearest to `from` on the ground, within `radius_m`; ties go to the smaller index.
+    fn nearest(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> Option<u32> {
+        let within = self.within(tree, from, radius_m);
+        within.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, index)| index)
+    }
+
+    /// The points of `tree` within `radius_m` of `from` on the ground: distance in metres and index.
+    fn within(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> impl Iterator<Item = (f64, u32)> {
+        let [mx, my] = self.ground.metres_per_unit(from);
+        let scale = [mx / self.x_scale, my]; // metres per unit of the plane
+        let reach = radius_m / scale[0].min(scale[1]);
+        let at = self.plane(from);
+        let distance = move |node: &Node| {
+            let d = ((node.at[0] - at[0]) * scale[0]).hypot((node.at[1] - at[1]) * scale[1]);
+            (d, node.index)
+        };
+        let candidates = tree.locate_within_distance(at, reach * reach * (1.0 + 1e-12));
+        candidates.map(distance).filter(move |(d, _)| *d <= radius_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
+
+    #[test]
+    fn t_is_a_radius_and_one_suspect_vertex_serves_one_reference_vertex() {
+        let reference = [[0.0, 0.0], [0.6, 0.0], [10.0, 0.0], [20.0, 0.0]];
+        let suspect = [[0.5, 0.0], [10.0, 0.99], [20.0, 1.01]];
+        let matches = Matcher::new(&reference, &METRES, [10.0, 0.0]).all(&suspect, 1.0);
+        assert_eq!(matches.suspect_of, [None, Some(0), Some(1), None]);
+        assert_eq!(matches.count, 2);
+    }
+
+    #[test]
+    fn the_radius_is_in_metres_at_every_latitude() {
+        let ground = Ground::WGS84;
+        // Two thirds of a metre east of points on the equator and at 70° N.
+        let reference = [[10.0, 0.0], [10.0, 70.0]];
+        let east = |p: [f64; 2]| [p[0] + 2.0 / 3.0 / ground.metres_per_unit(p)[0], p[1]];
+        let matcher = Matcher::new(&reference, &ground, [10.0, 35.0]);
+        assert_eq!(matcher.all(&reference.map(east), 0.7).count, 2);
+        assert_eq!(matcher.all(&reference.map(east), 0.6).count, 0);
+    }
+}

@@ -1,0 +1,11 @@
+//! Matching: which suspect vertex is which reference vertex (paper, section 3.5).
+
+mod chance;
+mod joined;
+mod matcher;
+mod matches;
+
+pub use chance::{LEAST_MATCHED, is_chance, out_of_place};
+pub use joined::Graph;
+pub use matcher::Matcher;
+pub use matches::Matches;

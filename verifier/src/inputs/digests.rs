@@ -1,0 +1,148 @@
+//! The files of a verification and what identifies them.
+
+use crate::{Error, Result, words::printable};
+use meshmark_dataset::workplace::folder_of;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::{
+    fmt::Write as _,
+    fs::File,
+    io::{self, Read},
+    path::{Path, PathBuf},
+};
+
+/// The files, digested before they are read as maps.
+#[derive(Debug, Clone, Serialize)]
+pub struct Inputs {
+    /// The key.
+    pub key: Digested,
+    /// The reference.
+    pub reference: Digested,
+    /// The suspect.
+    pub suspect: Digested,
+    /// The record, of many the best one; null without.
+    pub record: Option<Digested>,
+}
+
+/// A file or folder and what identifies it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Digested {
+    /// Its path, as it was given.
+    pub path: String,
+    /// "SHA-256 …", or why there is none.
+    pub digest: String,
+}
+
+impl Inputs {
+    /// Digests the files.
+    ///
+    /// # Errors
+    /// One of them cannot be read to its end.
+    pub fn read(key: &Path, reference: &Path, suspect: &Path) -> Result<Self> {
+        let (key, reference, suspect) = (digest(key)?, digest(reference)?, digest(suspect)?);
+        Ok(Inputs { key, reference, suspect, record: None })
+    }
+
+    /// With the record.
+    ///
+    /// # Errors
+    /// It cannot be read any more.
+    pub fn with_record(self, record: Option<&Path>) -> Result<Self> {
+        Ok(Inputs { record: record.map(digest).transpose()?, ..self })
+    }
+}
+
+/// SHA-256 of a file; of a folder, or a file with companions of the same name, that of the sorted list of
+/// their digests as `sha256sum` prints it.
+pub(crate) fn digest(path: &Path) -> Result<Digested> {
+    let failed = |error: io::Error| {
+        Error::Unreadable(format!("{} cannot be read to its end: {error}", path.display()))
+    };
+    let shown = printable(&path.display().to_string());
+    let files = files_of(path).map_err(failed)?;
+    let digest = match files.as_slice() {
+        [] => "it is not a local file, so it has no digest".into(),
+        [file] if file == path => format!("SHA-256 {}", file_digest(file).map_err(failed)?),
+        files => {
+            let mut list = String::new();
+            for file in files {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                let _ = writeln!(list, "{}  {name}", file_digest(file).map_err(failed)?);
+            }
+            format!("SHA-256 {} of the sha256sum list of its {} files", hex(list.as_bytes()), files.len())
+        }
+    };
+    Ok(Digested { path: shown, digest })
+}
+
+/// Formats of several files with the same name.
+const WITH_COMPANIONS: &[&str] = &["shp", "shx", "dbf", "tab", "mif"];
+
+/// The files that make up a map, sorted.
+fn files_of(path: &Path) -> io::Result<Vec<PathBuf>> {
+    if path.is_file() {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if !WITH_COMPANIONS.contains(&extension.as_str()) {
+            return Ok(vec![path.into()]);
+        }
+    } else if !path.is_dir() {
+        return Ok(Vec::new());
+    }
+    let folder = if path.is_dir() { path } else { folder_of(path) };
+    let mut files = Vec::new();
+    for entry in folder.read_dir()? {
+        let file = entry?.path();
+        if file.is_file() && (path.is_dir() || file.file_stem() == path.file_stem()) {
+            files.push(file);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn file_digest(path: &Path) -> io::Result<String> {
+    let (mut file, mut hash) = (File::open(path)?, Sha256::new());
+    let mut buffer = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut buffer)? {
+            0 => return Ok(digits(&hash.finalize())),
+            count => hash.update(&buffer[..count]),
+        }
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    digits(&Sha256::digest(bytes))
+}
+
+fn digits(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// SHA-256 of "abc" (FIPS 180-4).
+    const ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+
+    #[test]
+    fn a_file_has_its_own_digest_and_a_folder_that_of_its_sorted_list() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        for name in ["b.shp", "a.dbf", "a.shp"] {
+            std::fs::write(file(name), "abc").unwrap();
+        }
+        std::fs::write(file("map.gpkg"), "abc").unwrap();
+        assert_eq!(digest(&file("map.gpkg")).unwrap().digest, format!("SHA-256 {ABC}"));
+        let list = |names: &[&str]| names.iter().map(|n| format!("{ABC}  {n}\n")).collect::<String>();
+        let expected = hex(list(&["a.dbf", "a.shp"]).as_bytes());
+        assert_eq!(
+            digest(&file("a.shp")).unwrap().digest,
+            format!("SHA-256 {expected} of the sha256sum list of its 2 files")
+        );
+        let all = hex(list(&["a.dbf", "a.shp", "b.shp", "map.gpkg"]).as_bytes());
+        assert!(digest(folder.path()).unwrap().digest.contains(&all));
+        assert!(digest(&file("none")).unwrap().digest.contains("no digest"));
+    }
+}

@@ -1,0 +1,168 @@
+//! Maps: references, and maps that are marked or compared.
+
+use super::gdal_failures::{forget_failure, last_failure};
+use crate::{Error, Result};
+use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
+use meshmark_core::{
+    ground::Ground,
+    options::{Options, Spelling},
+    scale::ScaleLattice,
+};
+use meshmark_dataset::{
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
+    marking, survey,
+};
+use std::{collections::BTreeSet, path::Path};
+
+/// How to read a map.
+pub struct Reading<'a> {
+    /// Layers that form it.
+    pub layers: Option<&'a [String]>,
+    /// Its CRS when it has none.
+    pub srs: Option<&'a str>,
+    /// Attributes to take as landmarks.
+    pub landmarks: LabelFields<'a>,
+    /// Whether to keep its geometries.
+    pub geometries: bool,
+}
+
+/// Reads the reference: any vector dataset GDAL opens.
+pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
+    let dataset = open("reference", path, None)?;
+    if let LabelFields::Named(names) = reading.landmarks {
+        check_fields(path, &dataset, names)?;
+    }
+    read("reference", path, &dataset, reading, Target::Own)
+}
+
+/// Opens a map to be marked, and reads its vertices.
+pub(crate) fn source(
+    path: &Path,
+    options: &Options,
+    warn: &mut dyn FnMut(&str),
+) -> Result<(Dataset, Survey)> {
+    if path.as_os_str().as_encoded_bytes().get(..9).is_some_and(|p| p.eq_ignore_ascii_case(b"MESHMARK:")) {
+        let path = path.display();
+        return Err(Error::Usage(format!(
+            "the map {path} is a marked view already: name the dataset itself"
+        )));
+    }
+    let dataset = open("map", path, None)?;
+    let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
+    let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
+    let survey = read("map", path, &dataset, &reading, Target::Own)?;
+    marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
+    Ok((dataset, survey))
+}
+
+/// The geometries of a map in order, for a comparison, and the first CRS of a layer.
+pub fn geometries(
+    what: &str,
+    path: &Path,
+    layers: Option<&[String]>,
+) -> Result<(Vec<FeatureGeometry>, Option<CoordinateSystem>)> {
+    let dataset = open(what, path, None)?;
+    forget_failure();
+    let found = features(&dataset, layers, &last_failure);
+    Ok((found.map_err(|error| of_map(what, path, &error))?, first_crs(&dataset)))
+}
+
+pub(super) fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
+    dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer)
+}
+
+/// What the reference of a comparison is measured with.
+pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<ScaleLattice>)> {
+    let survey =
+        reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
+    survey.into_scales().map_err(|error| of_map("reference", path, &error))
+}
+
+fn of_map(what: &str, path: &Path, error: &meshmark_dataset::Error) -> Error {
+    Error::Unreadable(format!("the {what} {}: {error}", path.display()))
+}
+
+/// A misspelt field would leave no landmark, and nobody would know why.
+fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> {
+    let fields_of = |layer: gdal::vector::Layer| layer.defn().fields().map(|f| f.name()).collect::<Vec<_>>();
+    let known: BTreeSet<String> = dataset.layers().flat_map(fields_of).collect();
+    let unknown = names.iter().find(|name| !known.iter().any(|field| field.eq_ignore_ascii_case(name)));
+    let Some(name) = unknown else { return Ok(()) };
+    let known = known.into_iter().collect::<Vec<_>>().join(", ");
+    let path = path.display();
+    Err(Error::Usage(format!("the reference {path} has no field \"{name}\": --landmark may name {known}")))
+}
+
+pub(super) fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {
+    if holds_password(path) {
+        return Err(Error::Usage(format!(
+            "the {what} is a connection with a password in it, which reports and messages would repeat: give the \
+             password by a PGPASSFILE or service file, or an environment variable of the database's driver"
+        )));
+    }
+    forget_failure();
+    let mut open_options = marking::OPEN_OPTIONS.to_vec();
+    open_options.push("@WRITE_GFS=NO"); // a map that is read leaves nothing beside it
+    let options = DatasetOptions {
+        open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
+        open_options: Some(&open_options),
+        allowed_drivers,
+        ..Default::default()
+    };
+    Dataset::open_ex(path, options).map_err(|error| {
+        let reason = last_failure().unwrap_or_else(|| error.to_string());
+        let formats =
+            allowed_drivers.map_or(String::new(), |d| format!(" (a suspect may be {})", d.join(", ")));
+        Error::Unreadable(format!("the {what} {} cannot be opened: {reason}{formats}", path.display()))
+    })
+}
+
+/// Whether a connection to a database says its password: as `password=…`, `pwd=…` or `scheme://user:password@host`.
+fn holds_password(path: &Path) -> bool {
+    let text = path.to_string_lossy().to_lowercase();
+    let of_url = || text.split_once("://").and_then(|(_, rest)| rest.split('/').next()?.split_once('@'));
+    !path.exists()
+        && (["password", "passwd", "pwd"]
+            .iter()
+            .any(|word| text.split(word).skip(1).any(|rest| rest.trim_start().starts_with('=')))
+            || of_url().is_some_and(|(user, _)| user.contains(':')))
+}
+
+pub(super) fn read(
+    what: &str,
+    path: &Path,
+    dataset: &Dataset,
+    reading: &Reading,
+    target: Target,
+) -> Result<Survey> {
+    survey_of(dataset, reading, target).map_err(|error| failed(what, path, error))
+}
+
+pub(super) fn survey_of(
+    dataset: &Dataset,
+    reading: &Reading,
+    target: Target,
+) -> meshmark_dataset::Result<Survey> {
+    forget_failure();
+    let selection = Selection {
+        layers: reading.layers,
+        srs: reading.srs,
+        labels: reading.landmarks,
+        target,
+        geometries: reading.geometries,
+        most_vertices: MOST_VERTICES,
+        last_failure: &last_failure,
+    };
+    survey(dataset, &selection)
+}
+
+pub(crate) fn failed(what: &str, path: &Path, error: meshmark_dataset::Error) -> Error {
+    let text = format!("the {what} {}: {}", path.display(), error.text(Spelling::Flag));
+    match error {
+        meshmark_dataset::Error::TooLarge { .. } => Error::TooLarge(text),
+        meshmark_dataset::Error::UnknownLayer { .. }
+        | meshmark_dataset::Error::UnknownSrs(_)
+        | meshmark_dataset::Error::ContradictingSrs { .. } => Error::Usage(text),
+        _ => Error::Unreadable(text),
+    }
+}

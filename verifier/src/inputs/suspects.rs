@@ -1,0 +1,173 @@
+//! Suspects, which may be made to mislead: local files of plain formats, read without network.
+
+use super::maps::{Reading, failed, first_crs, open, read, survey_of};
+use crate::{Error, Result, words::printable};
+use gdal::{Dataset, vector::LayerAccess};
+use meshmark_dataset::{CoordinateSystem, Survey, Target};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+/// What a suspect may be: local files of plain formats. No format that points at other data (VRT,
+/// SQL, network), for a suspect may be made to mislead; and not MESHMARK.
+const SUSPECT_DRIVERS: &[&str] = &[
+    "GPKG",
+    "ESRI Shapefile",
+    "GeoJSON",
+    "GeoJSONSeq",
+    "FlatGeobuf",
+    "GML",
+    "KML",
+    "LIBKML",
+    "MapInfo File",
+    "DXF",
+    "CSV",
+    "SQLite",
+    "TopoJSON",
+];
+
+/// A suspect as it was read.
+pub struct Suspect {
+    /// In the CRS of the reference, where both CRS are known and its coordinates make sense in its own.
+    pub map: Survey,
+    /// Whether the numbers of `map` are as they stand in the file.
+    pub is_raw: bool,
+    /// CRS of its layers.
+    pub layer_crs: Vec<String>,
+    /// The first CRS of a layer.
+    pub crs: Option<CoordinateSystem>,
+}
+
+/// Reads the suspect in the CRS of the reference, where both are known; its numbers as they stand when they
+/// cannot be brought there.
+pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
+    let dataset = open_suspect(path)?;
+    let layer_crs = crs_of(&dataset);
+    let crs = first_crs(&dataset);
+    if let (Some(target), Some(_)) = (&reference.crs, &crs) {
+        match survey_of(&dataset, reading, Target::Crs(target)) {
+            Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
+            // PROJ, or the limits of what a map may be: the CRS is not that of the coordinates.
+            Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
+            Err(error) => return Err(failed("suspect", path, error)),
+        }
+    }
+    let map = read("suspect", path, &dataset, reading, Target::Raw)?;
+    Ok(Suspect { map, is_raw: true, layer_crs, crs })
+}
+
+/// Reads the numbers of the suspect as they stand.
+pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
+    read("suspect", path, &open_suspect(path)?, reading, Target::Raw)
+}
+
+fn open_suspect(path: &Path) -> Result<Dataset> {
+    if !path.is_file() && !path.is_dir() {
+        let path = path.display();
+        return Err(Error::Unreadable(format!("the suspect {path} is not a file here: give a local file")));
+    }
+    forbid_network().map_err(|error| Error::Unreadable(format!("GDAL takes no option: {error}")))?;
+    check_table(path)?;
+    let dataset = open("suspect", path, Some(SUSPECT_DRIVERS))?;
+    check_plain(path, &dataset)?;
+    Ok(dataset)
+}
+
+/// A suspect may name addresses: as the CRS of a GeoJSON file, as the schema of a GML file. Nobody shall learn
+/// from a request that it is being looked at, nor answer it.
+fn forbid_network() -> gdal::errors::Result<()> {
+    for (option, value) in [
+        ("GDAL_HTTP_PROXY", "127.0.0.1:0"), // no one can listen there
+        ("GDAL_HTTPS_PROXY", "127.0.0.1:0"),
+        ("CPL_VSIL_CURL_ALLOWED_FILENAME", "none"),
+        ("GML_DOWNLOAD_SCHEMA", "NO"),
+        ("GML_SKIP_RESOLVE_ELEMS", "ALL"),
+        ("ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW", "NO"),
+        ("OGR_SQLITE_LOAD_EXTENSIONS", ""),
+        ("SPATIALITE_SECURITY", "strict"),
+    ] {
+        gdal::config::set_thread_local_config_option(option, value)?;
+    }
+    Ok(())
+}
+
+/// Refuses MapInfo tables that are made of others, which may be anywhere.
+fn check_table(path: &Path) -> Result<()> {
+    let is_table = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tab"));
+    let tables: Vec<PathBuf> = match path.read_dir() {
+        Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| is_table(p)).collect(),
+        Err(_) => is_table(path).then(|| path.into()).into_iter().collect(),
+    };
+    for table in tables.iter().filter(|table| table.is_file()) {
+        let Ok(bytes) = std::fs::read(table) else { continue }; // GDAL will say why
+        let text = String::from_utf8_lossy(&bytes).to_lowercase();
+        let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
+        if seamless || text.contains("create view") {
+            return Err(Error::Unreadable(format!(
+                "the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr",
+                table.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Virtual tables that hold what is in the database itself; any other may point at other files.
+const PLAIN_MODULES: &[&str] = &[
+    "rtree",
+    "rtree_i32",
+    "fts3",
+    "fts4",
+    "fts5",
+    "virtualspatialindex",
+    "virtualelementary",
+    "virtualknn",
+    "virtualknn2",
+];
+
+/// Refuses a database with virtual tables that take their rows from elsewhere.
+fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
+    if !matches!(dataset.driver().short_name().as_str(), "GPKG" | "SQLite") {
+        return Ok(());
+    }
+    let failed = |error: gdal::errors::GdalError| {
+        Error::Unreadable(format!("the suspect {} cannot be read: {error}", path.display()))
+    };
+    // A forged schema may have any type, page and spacing; its text is what SQLite goes by.
+    let query = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
+    let tables = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT).map_err(failed)?;
+    let Some(mut tables) = tables else { return Ok(()) };
+    for table in tables.features() {
+        let text = |field: usize| table.field_as_string(field).ok().flatten().unwrap_or_default();
+        if !is_plain(&text(1)) {
+            return Err(Error::Unreadable(format!(
+                "the suspect {} has a virtual table \"{}\", which may point at other files: copy its layers to \
+                 a plain file, for example with ogr2ogr",
+                path.display(),
+                text(0).escape_debug()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the module of CREATE VIRTUAL TABLE name USING module(…) is a plain one. A name that has "using" in
+/// it finds no plain module, or the right one: every USING must be of a plain module.
+fn is_plain(sql: &str) -> bool {
+    let sql = sql.to_lowercase();
+    let modules = sql.split("using").skip(1).map(|rest| {
+        let word = rest.trim_start().split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        word.into_iter().next().unwrap_or_default()
+    });
+    let mut modules = modules.peekable();
+    modules.peek().is_some() && modules.all(|module| PLAIN_MODULES.contains(&module))
+}
+
+fn crs_of(dataset: &Dataset) -> Vec<String> {
+    let label = |layer: gdal::vector::Layer| {
+        let crs = layer.spatial_ref().and_then(CoordinateSystem::of_layer);
+        crs.map(|crs| printable(&crs.brief_name())).unwrap_or_else(|| "no CRS".into())
+    };
+    dataset.layers().map(label).collect::<BTreeSet<_>>().into_iter().collect()
+}

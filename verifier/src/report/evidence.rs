@@ -1,0 +1,108 @@
+//! What a report file holds beyond the answer.
+
+use super::sketch::Sketch;
+use crate::{inputs::digests::Inputs, words::printable};
+use serde::Serialize;
+
+/// Where on the map the evidence is.
+#[derive(Debug, Clone, Serialize)]
+pub struct Evidence {
+    /// The map, thinned.
+    #[serde(flatten)]
+    pub sketch: Sketch,
+    /// Of every patch, how many standard deviations its evidence for the message is above that of a random key; null
+    /// where nothing was observed. Empty when nothing was decoded or no message was expected.
+    pub patch_scores: Vec<Option<f64>>,
+}
+
+/// What was compared, and how to do it again.
+#[derive(Debug, Clone, Serialize)]
+pub struct Provenance {
+    /// The files.
+    #[serde(flatten)]
+    pub inputs: Inputs,
+    /// Digest of the vertices of the reference.
+    pub reference_vertices_sha256: String,
+    /// CRS of the suspect's layers.
+    pub suspect_crs: Vec<String>,
+    /// The command line.
+    pub command: String,
+    /// Programs and libraries that the result rests on, with their versions.
+    pub versions: Vec<String>,
+}
+
+/// This program, and the library that reads the maps.
+pub fn versions() -> Vec<String> {
+    let gdal = gdal::version::VersionInfo::release_name();
+    vec![format!("meshmark {}", env!("CARGO_PKG_VERSION")), format!("GDAL {gdal}")]
+}
+
+/// A command line without what only says where its output goes, and the report as `report.html`.
+pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
+    let mut words = vec!["meshmark".to_string()];
+    let mut arguments = arguments.skip(1);
+    let mut files = Vec::new(); // after "--" nothing is an option
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--" => {
+                files = std::iter::once("--".into()).chain(arguments.by_ref()).map(|w| quoted(&w)).collect()
+            }
+            "--report" | "--evidence-map" => drop(arguments.next()),
+            "--json" | "--explain" => {}
+            word if word.starts_with("--report=") || word.starts_with("--evidence-map=") => {}
+            word => words.push(quoted(word)),
+        }
+    }
+    words.extend(["--report".into(), "report.html".into()]);
+    words.extend(files);
+    words.join(" ")
+}
+
+/// For a shell; what would turn the order of what is read is written as bash, zsh and ksh read it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
+    if printable(word) != word {
+        let escaped = word.chars().map(|c| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            c if printable(c.encode_utf8(&mut [0; 4])).starts_with(c) => c.into(),
+            c => format!("\\u{:04x}", u32::from(c)),
+        });
+        return format!("$'{}'", escaped.collect::<String>());
+    }
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_line_can_be_given_to_a_shell_and_does_not_name_its_output() {
+        let of = |words: &[&str]| command_line(words.iter().map(|w| w.to_string()));
+        assert_eq!(
+            of(&[
+                "/opt/meshmark",
+                "verify",
+                "--report",
+                "a.html",
+                "--evidence-map",
+                "a.gpkg",
+                "--json",
+                "it's Ä map.gpkg",
+                "--report=b.html"
+            ]),
+            r"meshmark verify 'it'\''s Ä map.gpkg' --report report.html"
+        );
+        assert_eq!(
+            of(&["meshmark", "verify", "it's\u{202e}a\\b\n.gpkg"]),
+            r"meshmark verify $'it\'s\u202ea\\b\u000a.gpkg' --report report.html"
+        );
+        assert_eq!(
+            of(&["meshmark", "compare", "--report", "a.html", "--", "--json", "-b.gpkg"]),
+            "meshmark compare --report report.html -- --json -b.gpkg"
+        );
+    }
+}

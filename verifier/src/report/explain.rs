@@ -1,0 +1,198 @@
+//! What `--explain` prints: the report in sentences, for one who must rely on it.
+
+use super::Report;
+use crate::{
+    inputs::digests::Inputs,
+    words::{clipped, power_of_ten},
+};
+use meshmark_core::counted;
+use meshmark_detection::decision::{Null, Verdict};
+use std::fmt::Write as _;
+
+/// The report in sentences.
+pub fn explain(inputs: &Inputs, report: &Report) -> String {
+    let sections = [
+        ("What was compared", compared(inputs, report)),
+        ("What was found", found(report)),
+        ("What the message is bound to", bound(report)),
+        ("What was not tested", NOT_TESTED.map(String::from).to_vec()),
+        ("What makes this evidence", deposit(inputs, report)),
+    ];
+    let mut text = String::new();
+    for (title, sentences) in sections {
+        let _ = writeln!(text, "{title}");
+        sentences.iter().for_each(|sentence| {
+            let _ = writeln!(text, "  {sentence}");
+        });
+    }
+    text
+}
+
+fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
+    let (v, p) = (&report.vertices, &report.parameters);
+    let suspect_crs = match report.suspect_crs.as_slice() {
+        [] => "no layer".into(),
+        crs => crs.join(" and "),
+    };
+    let mut sentences = vec![
+        format!(
+            "The suspect {} has {} in {suspect_crs}.",
+            inputs.suspect.path,
+            counted(v.suspect, "distinct vertex")
+        ),
+        format!(
+            "The reference {} has {} in {}.",
+            inputs.reference.path,
+            counted(v.reference, "distinct vertex"),
+            p.crs.as_deref().unwrap_or("no CRS")
+        ),
+        format!("The key {} has the public id {}.", inputs.key.path, p.key_id),
+    ];
+    sentences.push(match &inputs.record {
+        Some(record) => format!("The record {} belongs to this key and this reference.", record.path),
+        None => "There was no record: how the map was marked was taken from the command line.".into(),
+    });
+    sentences.push(format!("File of the suspect: {}.", inputs.suspect.digest));
+    sentences
+}
+
+/// What was deposited, or must have been.
+pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
+    let mut sentences = vec![
+        "Whoever has the key and the reference can mark a map for any recipient, also afterwards, and can try \
+         keys until one seems to fit."
+            .into(),
+        "So reference, key and record must have been deposited with someone else before the copy was handed \
+         out, or these digests of them:"
+            .into(),
+        format!("Vertices of the reference: SHA-256 {}.", report.reference_digest),
+        format!("File of the reference: {}.", inputs.reference.digest),
+        format!("File of the key: {}; its id is {}.", inputs.key.digest, report.parameters.key_id),
+    ];
+    let record = inputs.record.as_ref();
+    sentences.extend(record.map(|record| format!("File of the record: {}.", record.digest)));
+    sentences
+}
+
+pub(crate) const NOT_TESTED: [&str; 4] = [
+    "Who passed the map on: the mark says whose copy it was made from.",
+    "Attributes, styles and which features are there: the mark is in the coordinates alone.",
+    "When the mark was made, and whether key and record are older than the suspect.",
+    "Other keys and other references: the p-values hold for one key and one reference fixed beforehand.",
+];
+
+fn found(report: &Report) -> Vec<String> {
+    let (v, p) = (&report.vertices, &report.parameters);
+    let mut sentences = assumed(report);
+    sentences.push(format!(
+        "{} of the {} reference vertices have a counterpart within {} m, the suspect being brought onto the reference \
+         by {}.",
+        v.matched, v.reference, p.radius_m, report.registration.method
+    ));
+    let Some(message) = &report.message else {
+        sentences.push(format!("Nothing was demodulated: {}.", report.reason));
+        return sentences;
+    };
+    let errors = report.bit_errors.map_or(String::new(), |errors| {
+        format!(", which differs from the expected message in {errors} of {} bits", report.bits.len())
+    });
+    let other = report.other_reading();
+    sentences.push(format!("The suspect was read as the message {message}{other}{errors}."));
+    sentences.extend(report.decoding().map(|how| format!("How it was decoded: {how}.")));
+    sentences.extend(probabilities(report));
+    sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
+    sentences
+}
+
+/// What was assumed to bring the suspect onto the reference, beyond an affine map.
+pub(crate) fn assumed(report: &Report) -> Vec<String> {
+    let registration = &report.registration;
+    let read_as = registration.read_as.as_ref().map(|read_as| {
+        let why = match report.suspect_crs.iter().all(|crs| crs == "no CRS") {
+            true => "has no CRS",
+            false => "does not lie there under the CRS it claims",
+        };
+        format!("The suspect {why}; its coordinates were read as {read_as}.")
+    });
+    let polynomial = registration.polynomial.map(|_| {
+        "An affine map left a smooth distortion, which a cubic polynomial took away: with it clearly more vertices \
+         match."
+            .into()
+    });
+    read_as.into_iter().chain(polynomial).collect()
+}
+
+pub(crate) fn probabilities(report: &Report) -> Vec<String> {
+    let mut sentences = Vec::new();
+    if let Some(p) = report.p_mark_log10 {
+        sentences.push(format!(
+            "A key that was not used shows so much evidence for this message with a probability of {}, whatever was \
+             done to the map.",
+            power_of_ten(p)
+        ));
+    }
+    if let Some(decoys) = &report.decoys {
+        let tested = decoys.tested.map_or(String::new(), |t| format!("; the tested key scores {t:.1}"));
+        sentences.push(format!(
+            "To check that, {} decoy keys were tried on this suspect: they score {:.2} on average, with a standard \
+             deviation of {:.2} and at most {:.1}{tested}.",
+            decoys.count, decoys.mean, decoys.standard_deviation, decoys.largest
+        ));
+    }
+    if let Some(p) = report.p_recipient_log10 {
+        let other = match report.null_hypothesis {
+            Some(Null::AnyOtherMessage) => {
+                "The message was not whitened, so numbers in sequence differ in few bits. A copy with any other message, \
+                 also one that differs in a single bit,"
+            }
+            _ => "A recipient of this key who has nothing to do with the copy, and so a random message,",
+        };
+        sentences.push(format!("{other} agrees so well with a probability of {}.", power_of_ten(p)));
+    }
+    if let Some(p) = report.p_any_message_log10 {
+        sentences.push(format!(
+            "A key that was not used shows so much evidence for any message at all with a probability of {}.",
+            power_of_ten(p)
+        ));
+    }
+    if let (None, 2.., Some(p)) = (&report.candidates, report.tried, report.p_value_log10) {
+        sentences.push(format!(
+            "There was no record to say whether the key whitened the message, and both were tried, so the larger of the \
+             probabilities for key and message counts twice: {}.",
+            power_of_ten(p)
+        ));
+    }
+    if let (Some(candidates), Some(p)) = (&report.candidates, report.p_value_log10) {
+        sentences.push(format!(
+            "{} tried, so the larger of the probabilities for key and recipient counts {}: {}.",
+            match candidates.tried {
+                1 => "1 record was".into(),
+                tried => format!("{tried} records were"),
+            },
+            counted(candidates.tried, "time"),
+            power_of_ten(p)
+        ));
+    }
+    sentences
+}
+
+/// What the message says of a person.
+pub(crate) fn bound(report: &Report) -> Vec<String> {
+    if report.candidates.is_some() && report.verdict != Verdict::Match {
+        return Vec::new(); // of many copies none
+    }
+    let p = &report.parameters;
+    let sentence = match (&p.recipient, &p.expected_message) {
+        (Some(recipient), Some(message)) => format!(
+            "The message {message} was computed again from the key and the recipient \"{}\": it is a keyed hash of \
+             the two, and without the key nobody can choose it.",
+            clipped(recipient)
+        ),
+        (None, Some(message)) => format!(
+            "The message {message} was given as bare bits: nothing in it names a recipient, and who received it must be \
+             shown by other means."
+        ),
+        _ => "No message was expected, so no recipient is named.".into(),
+    };
+    vec![sentence]
+}

@@ -1,0 +1,121 @@
+//! The report as a short answer for a person.
+
+use super::Report;
+use crate::words::power_of_ten;
+use meshmark_core::code::Decoder;
+use meshmark_detection::decision::Verdict;
+
+impl Report {
+    /// A short answer for a person.
+    pub fn to_text(&self) -> String {
+        let mut lines = vec![format!("verdict:      {}: {}", self.verdict_name(), self.reason)];
+        if let Some(candidates) = &self.candidates {
+            lines.extend(candidates.to_lines());
+        }
+        if let Some(message) = &self.message {
+            let errors = self.bit_errors.map_or(String::new(), |errors| {
+                format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
+            });
+            lines.push(format!("message:      {message}{}{errors}", self.other_reading()));
+            // Of noise, too, a code word and bits are made; their odds suppose a mark.
+            lines.extend(self.decoding().map(|how| format!("code:         {how}")));
+            lines.push(match self.shows_mark() {
+                true => format!("bits:         {}", certainty(&self.bits)),
+                false => "bits:         no better than guessed, for no mark of this key shows".into(),
+            });
+        }
+        lines.extend(self.p_value_lines());
+        let v = &self.vertices;
+        lines.push(format!(
+            "vertices:     {} of {} reference vertices found among {} of the suspect",
+            v.matched, v.reference, v.suspect
+        ));
+        lines.push(format!("registration: {}", self.registration.to_text()));
+        lines.join("\n") + "\n"
+    }
+
+    fn p_value_lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let (Some(p), Some(mark), Some(recipient)) =
+            (self.p_value_log10, self.p_mark_log10, self.p_recipient_log10)
+        {
+            let tried = if self.tried > 1 { format!(", times {} tried", self.tried) } else { String::new() };
+            lines.push(format!(
+                "p-value:      {} (key {}, recipient {}{tried})",
+                power_of_ten(p),
+                power_of_ten(mark),
+                power_of_ten(recipient)
+            ));
+        }
+        if let Some(p) = self.p_any_message_log10.filter(|_| self.verdict != Verdict::Match) {
+            let says = match self.shows_key() {
+                true => "a mark of this key is present, whatever its message or code",
+                false => "no mark of this key shows, whatever its message",
+            };
+            lines.push(format!("key:          {says} (p-value {})", power_of_ten(p)));
+        }
+        lines
+    }
+
+    /// What the message is where nothing says whether the key whitened it.
+    pub(crate) fn other_reading(&self) -> String {
+        let other = self.unwhitened_message.as_ref().filter(|_| self.parameters.expected_message.is_none());
+        other.map_or(String::new(), |other| format!(", or {other} if the copy was marked with MESSAGE"))
+    }
+
+    /// What LDPC did with the mark that shows, for a person.
+    pub(crate) fn decoding(&self) -> Option<String> {
+        let how = match self.code.decoder.filter(|_| self.shows_mark())? {
+            Decoder::Sign => return None,
+            Decoder::BeliefPropagation => "belief propagation, all parity checks hold",
+            Decoder::OrderedStatistics => "ordered statistics, the most likely code word of those near",
+        };
+        let of = self.code.name.channel_bits(self.bits.len()).expect("they were decoded");
+        let wrong =
+            self.code.channel_bit_errors.map(|wrong| format!("{wrong} of {of} code bits were wrong; "));
+        Some(format!("{}read by {how}", wrong.unwrap_or_default()))
+    }
+
+    /// Whether what was decoded is a mark rather than noise.
+    pub(crate) fn shows_mark(&self) -> bool {
+        self.verdict == Verdict::Match || self.shows_key()
+    }
+
+    /// Whether some mark of the key is there, whatever its message.
+    pub(crate) fn shows_key(&self) -> bool {
+        self.p_any_message_log10.is_some_and(|p| p < self.parameters.significance.log10())
+    }
+
+    pub(crate) fn verdict_name(&self) -> &'static str {
+        match self.verdict {
+            Verdict::Match => "MATCH",
+            Verdict::NoMatch => "NO MATCH",
+            Verdict::Inconclusive => "INCONCLUSIVE",
+        }
+    }
+}
+
+/// How sure the bits are, from their log-likelihood ratios.
+pub(crate) fn certainty(bits: &[f64]) -> String {
+    let mut sure: Vec<f64> = bits.iter().map(|llr| llr.abs()).collect();
+    sure.sort_by(f64::total_cmp);
+    let beyond = sure.iter().filter(|llr| **llr > 1000f64.ln()).count();
+    let (weakest, median) = (odds(sure[0]), odds(sure[sure.len() / 2]));
+    format!("weakest right with odds {weakest}, median {median}; {beyond} of {} over 1000 to 1", bits.len())
+}
+
+/// "1000 to 1", from a log-likelihood ratio.
+fn odds(llr: f64) -> String {
+    if llr > 13.8 { "over a million to 1".into() } else { format!("{:.1} to 1", llr.exp()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_certainty_of_the_bits_is_in_odds() {
+        let text = certainty(&[-20.0, 2f64.ln(), 7.0, -7.5, 0.0]);
+        assert_eq!(text, "weakest right with odds 1.0 to 1, median 1096.6 to 1; 3 of 5 over 1000 to 1");
+    }
+}

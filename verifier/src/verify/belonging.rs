@@ -1,0 +1,43 @@
+//! Whether a record belongs to a key and a reference.
+
+use super::request::Request;
+use crate::{Error, Result};
+use meshmark_core::{key::SecretKey, record::Record};
+use meshmark_dataset::Survey;
+
+/// The record must be of this key, and its message what key and recipient give.
+///
+/// # Errors
+/// It is of another key, or was changed.
+pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
+    if record.key_id != key.id() {
+        return Err(Error::DoesNotBelong(format!(
+            "the record was made with key {}, and this is key {}: give the key it was made with",
+            record.key_id,
+            key.id()
+        )));
+    }
+    if record.subject()?.message(key) != record.message()? {
+        return Err(Error::DoesNotBelong(
+            "the record's message is not that of its recipient under this key: the record was changed".into(),
+        ));
+    }
+    Ok(())
+}
+
+/// The record must be of this very reference, whose vertices have this digest: the mesh of any other differs.
+///
+/// # Errors
+/// It is of another one.
+pub fn check_reference(record: &Record, request: &Request, reference: &Survey, digest: &str) -> Result<()> {
+    if record.reference.vertices_sha256 == digest {
+        return Ok(());
+    }
+    Err(Error::DoesNotBelong(format!(
+        "the record was made from another reference ({} vertices) than {} ({} vertices): give the file that was \
+         marked, unchanged",
+        record.reference.vertices,
+        request.reference.display(),
+        reference.data.vertices.len()
+    )))
+}

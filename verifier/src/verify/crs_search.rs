@@ -1,0 +1,116 @@
+//! Which CRS are the suspect's numbers in? Its own, unless they make no sense there.
+//!
+//! Every likely CRS is a candidate start of the registration, with x and y exchanged or not, and the one under
+//! which most vertices match wins. No key is involved, so trying many costs no significance.
+
+use crate::{
+    Result,
+    inputs::{
+        maps::Reading,
+        suspects::{Suspect, raw_suspect},
+    },
+    words::printable,
+};
+use meshmark_dataset::{Assumption, Survey, likely_assumptions, overlaps};
+use meshmark_detection::registration::{ReadAs, Registrar, Registration, Start};
+use std::path::Path;
+
+/// A suspect in the coordinates it was registered from.
+pub struct Registered {
+    /// In the CRS of the reference.
+    pub map: Survey,
+    /// From there to the reference.
+    pub registration: Registration,
+}
+
+/// Registers a suspect under its own CRS, and under others when it has none or is not where the reference is.
+///
+/// # Errors
+/// The suspect cannot be read a second time.
+pub fn register(
+    registrar: &Registrar,
+    reference: &Survey,
+    suspect: Suspect,
+    (file, reading): (&Path, &Reading),
+    start: Start,
+) -> Result<Registered> {
+    let Suspect { map, is_raw, crs, .. } = suspect;
+    let doubtful = is_raw || !overlaps(&map, reference);
+    let at_first = match start {
+        Start::None => registrar.as_it_stands(&map.data),
+        // What a wrong CRS does to a map is not quite affine: the right one comes before other starts.
+        Start::Auto if doubtful => registrar.refine_in_place(&map.data),
+        _ => registrar.register(&map.data, start),
+    };
+    // Where the numbers were not reprojected they are taken to be in the reference's CRS.
+    let has_numbers = is_raw && !map.data.vertices.is_empty();
+    let own =
+        reference.crs.clone().filter(|_| has_numbers).map(|crs| Assumption { crs, axes_swapped: false });
+    let plain = Registered::new(map, own.as_ref(), at_first);
+    if start == Start::None || plain.agrees() || !doubtful && plain.registration.agrees_in_part() {
+        return Ok(plain);
+    }
+    let again = if is_raw { None } else { Some(raw_suspect(file, reading)?) };
+    let raw = again.as_ref().unwrap_or(&plain.map);
+    let assumptions = likely_assumptions(raw, crs.as_ref(), reference);
+    let assumed = in_place(registrar, reference, raw, &assumptions);
+    if start == Start::Auto && assumed.as_ref().is_some_and(Registered::agrees) {
+        return Ok(assumed.expect("it agrees"));
+    }
+    let plain = match doubtful && start == Start::Auto {
+        true => plain.search_all(registrar, start),
+        false => plain, // it was searched before
+    };
+    let Some(assumed) = assumed.filter(|_| !plain.registration.agrees_in_part()) else { return Ok(plain) };
+    Ok(plain.or_better(assumed.search_all(registrar, start)))
+}
+
+/// The assumption under which most vertices match where they are.
+fn in_place(
+    registrar: &Registrar,
+    reference: &Survey,
+    raw: &Survey,
+    assumptions: &[Assumption],
+) -> Option<Registered> {
+    let target = reference.crs.as_ref()?;
+    let mut best: Option<Registered> = None;
+    for assumption in assumptions {
+        let Ok(map) = assumption.apply(raw, target) else { continue };
+        let registration = registrar.refine_in_place(&map.data);
+        let next = Registered::new(map, Some(assumption), registration);
+        let agrees = next.agrees();
+        best = Some(match best {
+            Some(best) => best.or_better(next),
+            None => next,
+        });
+        if agrees {
+            break;
+        }
+    }
+    best
+}
+
+impl Registered {
+    fn new(map: Survey, assumption: Option<&Assumption>, registration: Registration) -> Self {
+        let read_as = assumption.map(|assumed| ReadAs {
+            crs: printable(&assumed.crs.brief_name()),
+            axes_swapped: assumed.axes_swapped,
+        });
+        Registered { map, registration: Registration { read_as, ..registration } }
+    }
+
+    fn agrees(&self) -> bool {
+        self.registration.agrees()
+    }
+
+    /// The same map from all starts.
+    fn search_all(self, registrar: &Registrar, start: Start) -> Self {
+        let read_as = self.registration.read_as;
+        let registration = registrar.register(&self.map.data, start);
+        Registered { map: self.map, registration: Registration { read_as, ..registration } }
+    }
+
+    fn or_better(self, next: Registered) -> Registered {
+        if next.registration.matched > self.registration.matched { next } else { self }
+    }
+}

@@ -1,0 +1,145 @@
+//! The examination of a suspect: registered, matched, demodulated. No message is involved.
+
+use super::{
+    crs_search::{self, Registered},
+    request::Request,
+};
+use crate::{
+    Error, Result,
+    inputs::{maps, maps::Reading, suspects},
+    progress::Progress,
+    report::{
+        EvidenceMap, VertexCounts,
+        sketch::{Scene, Sketch},
+    },
+};
+use meshmark_core::{demodulation::Demodulation, options::Spelling};
+use meshmark_dataset::{LabelFields, Survey};
+use meshmark_detection::{
+    Demodulated, Matched, Reference,
+    decision::Decoys,
+    matching::LEAST_MATCHED,
+    registration::{Registrar, Registration, Start},
+};
+
+/// What a suspect shows before it is compared with any message.
+pub struct Examination {
+    /// How the suspect was brought onto the reference.
+    pub registration: Registration,
+    /// Vertices of the two maps.
+    pub vertices: VertexCounts,
+    /// Digest of the vertices of the reference.
+    pub reference_digest: String,
+    /// CRS of the reference.
+    pub crs: Option<String>,
+    /// CRS of the suspect's layers.
+    pub suspect_crs: Vec<String>,
+    /// What was demodulated, or why nothing was.
+    pub found: std::result::Result<Demodulation, String>,
+    /// How decoy keys score.
+    pub decoys: Option<Decoys>,
+    /// What a report file draws, when that was asked for.
+    pub sketch: Option<Sketch>,
+    /// What a GIS draws, when that was asked for.
+    pub evidence_map: Option<EvidenceMap>,
+}
+
+/// Reads the reference of a request.
+///
+/// # Errors
+/// It cannot be read, or has not what the request names.
+pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Survey> {
+    progress.start("reading", 0);
+    let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
+    maps::reference(
+        &request.reference,
+        &Reading { layers, srs, landmarks: request.landmarks(), geometries: false },
+    )
+}
+
+/// Registers, matches and demodulates the suspect of a request.
+///
+/// # Errors
+/// An unreadable suspect, parameters that do not fit the reference.
+pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Examination> {
+    let map = reference.map().map_err(|error| of_reference(request, error))?;
+    progress.start("reading", 0);
+    let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
+    let suspect = suspects::suspect(&request.suspect, &plain, reference)?;
+    let suspect_crs = suspect.layer_crs.clone();
+
+    progress.start("patches", 0);
+    let compared = Reference::new(&reference.data, &map, request.bits, &request.parameters);
+    let compared = compared.map_err(|error| of_reference(request, error))?; // before the map is searched for
+
+    progress.start("registration", 0);
+    let registrar = Registrar::new(&reference.data, &compared.ground, request.radius_m);
+    let file = (request.suspect.as_path(), &plain);
+    let Registered { map: suspect, registration } =
+        crs_search::register(&registrar, reference, suspect, file, request.registration)?;
+
+    progress.start("matching", 0);
+    let matched = Matched::new(&compared, &suspect.data, &registration, request.radius_m);
+    let mark = (request.mark(), request.demodulator);
+    let demodulated = match matched.is_chance() {
+        true => None,
+        false => {
+            let found =
+                progress.listen(|listener| matched.demodulate(mark.0, mark.1, request.radius_m, listener));
+            Some(found.map_err(|error| of_reference(request, error))?)
+        }
+    };
+    let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
+    let vertices = VertexCounts {
+        reference: reference.data.vertices.len(),
+        suspect: suspect.data.vertices.len(),
+        matched: matches.count,
+    };
+    let scene = Scene { matched: &matched, matches, demodulated: demodulated.as_ref() };
+    let sketch = request.sketch.then(|| scene.sketch(&registration));
+    let evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene, reference.crs.as_ref()));
+    let (found, decoys) = match demodulated {
+        Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),
+        None => (Err(unregistered(&vertices, matched.by_chance, request.registration)), None),
+    };
+    Ok(Examination {
+        registration,
+        vertices,
+        reference_digest: reference.data.vertices.digest(),
+        crs: reference.crs.as_ref().map(|crs| crs.brief_name()),
+        suspect_crs,
+        found,
+        decoys,
+        sketch,
+        evidence_map,
+    })
+}
+
+/// What does not fit the reference: its options are flags here.
+fn of_reference(request: &Request, error: impl Into<meshmark_dataset::Error>) -> Error {
+    Error::Usage(format!(
+        "the reference {}: {}",
+        request.reference.display(),
+        error.into().text(Spelling::Flag)
+    ))
+}
+
+fn unregistered(vertices: &VertexCounts, chance: usize, start: Start) -> String {
+    if vertices.suspect == 0 {
+        return "the suspect has no vertices, so there is nothing to compare".into();
+    }
+    let remedy = match start {
+        Start::Auto => "",
+        Start::Landmarks => "; only landmarks were tried, --registration auto tries all that is known",
+        Start::Geometry => {
+            "; only geometry was tried, for which too few features may have a shape of their own: --registration auto \
+             tries landmarks too"
+        }
+        Start::None => "; it was taken as it stands, --registration auto looks for its place",
+    };
+    format!(
+        "only {} of {} reference vertices match, where {LEAST_MATCHED} are needed and {chance} match by chance: the suspect is \
+         too small a piece, another map, or could not be brought onto the reference{remedy}",
+        vertices.matched, vertices.reference
+    )
+}

@@ -1,0 +1,57 @@
+//! Verification from files to a report.
+//!
+//! ```text
+//! request ─► examination ─► decision ─► conclusion ─► report
+//!             crs_search, detection
+//! ```
+//!
+//! [`verify()`] asks for one mark, [`verify_records`] for that of every record of a folder.
+
+mod belonging;
+mod conclusion;
+mod crs_search;
+mod examination;
+mod records;
+mod request;
+
+pub use belonging::{check_key, check_reference};
+pub use examination::{Examination, examine, read_reference};
+pub use records::verify_records;
+pub use request::Request;
+
+use crate::{Result, progress::Progress, report::Report};
+use conclusion::conclude;
+use meshmark_core::{demodulation::Demodulation, options::Subject};
+use meshmark_detection::decision::{Decision, Expected, decide_among};
+
+/// Verifies one suspect.
+///
+/// # Errors
+/// Unreadable input, parameters that do not fit the reference, a record of another reference.
+pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
+    let reference = read_reference(request, progress)?;
+    if let Some(record) = &request.record {
+        check_reference(record, request, &reference, &reference.data.vertices.digest())?;
+    }
+    let seen = examine(request, &reference, progress)?;
+    let (subject, decision) = match &seen.found {
+        Ok(found) => decide_subjects(request, found),
+        Err(reason) => (request.subject.clone(), Decision::inconclusive(reason.clone())),
+    };
+    let request = Request { subject, ..request.clone() };
+    Ok(conclude(&request, &seen, decision, progress.finish()))
+}
+
+/// The best of what the mark may say, and the decision on it.
+fn decide_subjects(request: &Request, found: &Demodulation) -> (Option<Subject>, Decision) {
+    let subjects = request.subjects();
+    let tried = subjects.len();
+    let decide = |subject: Subject| {
+        let expected = Expected::new(&subject, &request.key);
+        (Some(subject), decide_among(found, &expected, tried, request.significance))
+    };
+    let p = |decision: &Decision| decision.p_value_log10().unwrap_or(f64::INFINITY);
+    let decisions = subjects.into_iter().map(decide);
+    let best = decisions.min_by(|(_, a), (_, b)| p(a).total_cmp(&p(b)));
+    best.unwrap_or_else(|| (None, Decision::without_message()))
+}

@@ -1,0 +1,279 @@
+//! Many records, one suspect: which recipient's copy is it?
+//!
+//! Records that were made with the same settings expect the same mark but for its message: the suspect is
+//! registered, matched and demodulated once for all of them.
+
+use super::{
+    belonging::{check_key, check_reference},
+    conclusion::conclude,
+    examination::{Examination, examine, read_reference},
+    request::Request,
+};
+use crate::{
+    Error, Result,
+    inputs::texts,
+    progress::Progress,
+    report::{Candidates, Entry, Report},
+};
+use meshmark_core::{
+    demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
+};
+use meshmark_detection::decision::{Decision, Expected, Verdict, decide_among};
+use std::path::Path;
+
+/// So many of the best are listed, and every match.
+const MOST_LISTED: usize = 20;
+
+/// A record of the folder.
+struct Candidate {
+    file: String,
+    record: Record,
+    subject: Subject,
+    /// As the record has it.
+    message: Message,
+}
+
+/// Candidates with the same settings.
+struct Group {
+    request: Request,
+    candidates: Vec<Candidate>,
+}
+
+/// What came of one candidate.
+struct Outcome {
+    group: usize,
+    candidate: Candidate,
+    decision: Decision,
+    bit_errors: Option<usize>,
+}
+
+/// Verifies one suspect against every record (*.json) of a folder. `request` says how; what it says of the mark
+/// is taken from the records. `warn` is told which files are skipped, and why.
+///
+/// # Errors
+/// As [`crate::verify()`], and when no record is usable.
+pub fn verify_records(
+    request: &Request,
+    folder: &Path,
+    progress: &mut Progress,
+    warn: &mut dyn FnMut(&str),
+) -> Result<Report> {
+    let mut skipped: Vec<(String, Vec<String>)> = Vec::new();
+    let mut skip = |file: &str, reason: String| match skipped.iter_mut().find(|(r, _)| *r == reason) {
+        Some((_, files)) => files.push(file.into()),
+        None => skipped.push((reason, vec![file.into()])),
+    };
+    let groups = groups(request, read_all(folder, &request.key, &mut skip)?)?;
+    let mut examined: Vec<(Request, Examination)> = Vec::new();
+    let mut of_group = Vec::new();
+    for group in groups {
+        let Some((group, seen)) = examine_group(group, progress, &mut skip)? else { continue };
+        of_group.push(group.candidates);
+        examined.push((group.request, seen));
+    }
+    let left_out = skipped.iter().map(|(_, files)| files.len()).sum();
+    for (reason, files) in &skipped {
+        warn(&format!("{} skipped: {reason}", folder.join(these_are(files)).display()));
+    }
+    let outcomes = decide_all(of_group, &examined, request.significance);
+    let Some(best) = outcomes.first() else {
+        return Err(Error::Usage(format!(
+            "no file of {} is a record of this key and this reference: give the folder the records were written to",
+            folder.display()
+        )));
+    };
+    let (template, seen) = &examined[best.group];
+    let chosen = Request {
+        record: Some(best.candidate.record.clone()),
+        subject: Some(best.candidate.subject.clone()),
+        ..template.clone()
+    };
+    let report = conclude(&chosen, seen, overall(&outcomes), progress.finish());
+    Ok(Report { candidates: Some(listed(&outcomes, left_out)), ..report })
+}
+
+/// "a.json is", "a.json, b.json and 31 more are".
+fn these_are(files: &[String]) -> String {
+    match files {
+        [file] => format!("{file} is"),
+        [first, second] => format!("{first} and {second} are"),
+        [first, second, more @ ..] => format!("{first}, {second} and {} more are", more.len()),
+        [] => unreachable!("a reason is that of a file"),
+    }
+}
+
+/// Reads what can be read, in the order of file names.
+fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) -> Result<Vec<Candidate>> {
+    let unreadable = |error: std::io::Error| {
+        Error::Usage(format!("the folder {} cannot be read: {error}", folder.display()))
+    };
+    let mut files = Vec::new();
+    for entry in folder.read_dir().map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) && path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    let mut candidates = Vec::new();
+    for path in files {
+        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let checked = texts::record(&path).and_then(|record| {
+            check_key(&record, key)?;
+            let (subject, message) = (record.subject()?, record.message()?);
+            Ok((record, subject, message))
+        });
+        match checked {
+            Ok((record, subject, message)) => {
+                candidates.push(Candidate { file, record, subject, message });
+            }
+            Err(error) => skip(&file, without_name(&error, &path)),
+        }
+    }
+    Ok(candidates)
+}
+
+fn without_name(error: &Error, path: &Path) -> String {
+    let text = error.to_string();
+    text.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&text).into()
+}
+
+/// Puts records together that differ in their message alone.
+fn groups(request: &Request, candidates: Vec<Candidate>) -> Result<Vec<Group>> {
+    let mut groups: Vec<Group> = Vec::new();
+    for candidate in candidates {
+        let (record, bits) = (&candidate.record, candidate.message.len());
+        let parameters = record.parameters()?;
+        let same = |group: &&mut Group| {
+            let r = &group.request;
+            r.parameters == parameters && r.layers == record.layers && r.srs == record.srs && r.bits == bits
+        };
+        if let Some(group) = groups.iter_mut().find(same) {
+            group.candidates.push(candidate);
+            continue;
+        }
+        let (layers, srs) = (record.layers.clone(), record.srs.clone());
+        let request = Request { parameters, layers, srs, bits, ..request.clone() };
+        groups.push(Group { request, candidates: vec![candidate] });
+    }
+    Ok(groups)
+}
+
+/// Demodulates the suspect for one group; `None` when no record of it is of this reference.
+fn examine_group(
+    mut group: Group,
+    progress: &mut Progress,
+    skip: &mut dyn FnMut(&str, String),
+) -> Result<Option<(Group, Examination)>> {
+    let reference = read_reference(&group.request, progress);
+    let Some(reference) = or_skip(reference, &group, skip)? else { return Ok(None) };
+    let digest = reference.data.vertices.digest();
+    group.candidates.retain(|candidate| {
+        let checked = check_reference(&candidate.record, &group.request, &reference, &digest);
+        if let Err(error) = &checked {
+            skip(&candidate.file, error.to_string());
+        }
+        checked.is_ok()
+    });
+    if group.candidates.is_empty() {
+        return Ok(None);
+    }
+    let seen = examine(&group.request, &reference, progress);
+    Ok(or_skip(seen, &group, skip)?.map(|seen| (group, seen)))
+}
+
+/// What does not fit the reference is wrong in the records.
+fn or_skip<T>(result: Result<T>, group: &Group, skip: &mut dyn FnMut(&str, String)) -> Result<Option<T>> {
+    match result {
+        Ok(done) => Ok(Some(done)),
+        Err(Error::Usage(reason)) => {
+            group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.clone()));
+            Ok(None)
+        }
+        Err(other) => Err(other),
+    }
+}
+
+/// Decides on every candidate; the best comes first.
+fn decide_all(
+    of_group: Vec<Vec<Candidate>>,
+    examined: &[(Request, Examination)],
+    significance: f64,
+) -> Vec<Outcome> {
+    let tried = of_group.iter().map(Vec::len).sum();
+    let found = |group: usize| examined[group].1.found.as_ref();
+    let messages: Vec<_> =
+        (0..examined.len()).map(|group| found(group).ok().map(Demodulation::message)).collect();
+    let decide = |(group, candidate): (usize, Candidate)| {
+        let expected = Expected::new(&candidate.subject, &examined[group].0.key);
+        let decision = match found(group) {
+            Ok(found) => decide_among(found, &expected, tried, significance),
+            Err(reason) => Decision::inconclusive(reason.clone()),
+        };
+        let bit_errors = messages[group].as_ref().map(|message| message.errors(&expected.carried));
+        Outcome { group, candidate, decision, bit_errors }
+    };
+    let all = of_group
+        .into_iter()
+        .enumerate()
+        .flat_map(|(g, candidates)| candidates.into_iter().map(move |c| (g, c)));
+    let mut outcomes: Vec<Outcome> = all.map(decide).collect();
+    let rank = |outcome: &Outcome| {
+        let p = outcome.decision.p_value_log10().unwrap_or(f64::INFINITY);
+        (outcome.decision.verdict != Verdict::Match, p)
+    };
+    outcomes.sort_by(|a, b| {
+        let ((a_other, a_p), (b_other, b_p)) = (rank(a), rank(b));
+        let by_errors = a.bit_errors.cmp(&b.bit_errors);
+        a_other
+            .cmp(&b_other)
+            .then(a_p.total_cmp(&b_p))
+            .then(by_errors)
+            .then(a.candidate.file.cmp(&b.candidate.file))
+    });
+    outcomes
+}
+
+/// The answer to all of them: the grounds are those of the best.
+fn overall(outcomes: &[Outcome]) -> Decision {
+    let best = outcomes[0].decision.clone();
+    let matches = count_matches(outcomes);
+    let unclear = outcomes.iter().find(|o| o.decision.verdict == Verdict::Inconclusive);
+    match (matches, unclear) {
+        (0, Some(unclear)) => {
+            let reason = unclear.decision.reason.clone();
+            Decision { verdict: Verdict::Inconclusive, reason, ..best }
+        }
+        (0, None) => Decision {
+            reason: "a mark with this key, this reference and the message and options of any of these records would \
+                     have shown, and none does"
+                .into(),
+            ..best
+        },
+        (1, _) => best,
+        _ => Decision {
+            reason: format!(
+                "for {matches} of the records the probability that key and message fit so well by chance is below the \
+                 significance"
+            ),
+            ..best
+        },
+    }
+}
+
+fn count_matches(outcomes: &[Outcome]) -> usize {
+    outcomes.iter().filter(|o| o.decision.verdict == Verdict::Match).count()
+}
+
+fn listed(outcomes: &[Outcome], skipped: usize) -> Candidates {
+    let matches = count_matches(outcomes);
+    let entry = |outcome: &Outcome| Entry {
+        record: outcome.candidate.file.clone(),
+        recipient: outcome.candidate.record.recipient.clone(),
+        message: outcome.candidate.message.to_hex(),
+        p_value_log10: outcome.decision.p_value_log10(),
+        bit_errors: outcome.bit_errors,
+    };
+    let list = outcomes.iter().take(MOST_LISTED.max(matches)).map(entry).collect();
+    Candidates { tried: outcomes.len(), skipped, list, matches }
+}

@@ -1,0 +1,35 @@
+//! Numbers and names in messages and reports.
+
+/// A probability from its logarithm.
+pub fn power_of_ten(log10: f64) -> String {
+    if log10 > -3.0 { format!("{:.3}", 10f64.powf(log10)) } else { format!("10^{log10:.1}") }
+}
+
+/// Text of a file on one line, without what would steer a terminal or turn the order of what is read.
+pub fn printable(text: &str) -> String {
+    let turns = |c: char| matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.chars().map(|c| if c.is_control() || turns(c) { '\u{fffd}' } else { c }).collect()
+}
+
+/// A longer name fills pages.
+const LONGEST_NAME: usize = 200;
+
+/// The same of a name, cut short when it fills pages; the JSON has all of it.
+pub(crate) fn clipped(name: &str) -> String {
+    let printable = printable(name);
+    match printable.char_indices().nth(LONGEST_NAME) {
+        None => printable,
+        Some((end, _)) => format!("{}… ({} characters)", &printable[..end], name.chars().count()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_do_not_steer_the_terminal() {
+        assert_eq!(printable("A\u{1b}[31m\nB é"), "A\u{fffd}[31m\u{fffd}B é");
+        assert_eq!(printable("HbmG \u{202e}EMCA"), "HbmG \u{fffd}EMCA");
+    }
+}
