@@ -135,7 +135,7 @@ class Inputs:
             raise QgsProcessingException(tr("{} exists: choose another name for the report.").format(place))
         layers.copy([given], place, context, feedback)
         if self._is_kept:
-            feedback.pushInfo(tr("What {} shows is kept beside the report: {}").format(given.name, place))
+            feedback.pushInfo(tr("The displayed content of {} is saved beside the report: {}").format(given.name, place))
         return place
 
 

@@ -28,9 +28,9 @@ class Compare(Algorithm):
 
     def about(self):
         return tr(
-            "Says what marking did to a map: how far vertices moved, how angles and areas changed, and whether"
-            " anything became invalid, overlaps or crosses that did not before. Features correspond by their order"
-            " in each layer, vertices by their order in each feature."
+            "Measures the effect of marking on a map: how far vertices moved, how angles and areas changed, and whether"
+            " there are new invalid geometries, overlaps or crossings. Features correspond by their order in each"
+            " layer, vertices by their order in each feature."
         )
 
     def needs(self):

@@ -97,7 +97,7 @@ class ExportPanel(Panel):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(widget, 1)
         button = QPushButton(tr("New key…"))
-        button.setToolTip(tr("Makes a secret key in a new file."))
+        button.setToolTip(tr("Creates a secret key in a new file."))
         button.clicked.connect(self._new_key)
         layout.addWidget(button)
         return row

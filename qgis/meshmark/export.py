@@ -72,20 +72,20 @@ class Export(Algorithm):
         )
         self.add(
             QgsProcessingParameterFile("KEY", tr("Key file"), defaultValue=settings.get(settings.KEY_FILE) or None),
-            tr("The secret key, made once by `meshmark keygen key.json`. Only its path is handed on."),
+            tr("The secret key, made once by `meshmark keygen key.json`. Only its path is passed on."),
         )
         records = QgsProcessingParameterFile.Behavior.Folder
         self.add(
             QgsProcessingParameterFile(
                 "RECORDS", tr("Record folder"), records, defaultValue=settings.get(settings.RECORD_FOLDER) or None
             ),
-            tr("Where the record (.json) and the reference (.reference.gpkg) of this copy are kept for an auditor."),
+            tr("The folder for the record (.json) and the reference (.reference.gpkg), which an auditor needs."),
         )
         for made in options.values():
             self.addParameter(parameters.advanced(made))
         self.add(
             parameters.advanced(QgsProcessingParameterBoolean("ADD_TO_PROJECT", tr("Add to the project"), True)),
-            tr("Shows the marked map when it is written."),
+            tr("Loads the marked map after the export."),
         )
         self.addOutput(QgsProcessingOutputMultipleLayers("MARKED_LAYERS", tr("Marked layers")))
         self.addOutput(QgsProcessingOutputFile("RECORD", tr("Record")))

@@ -43,7 +43,7 @@ class OptionsPage(QgsOptionsPageWidget):
             self._widgets[name] = widget
         note = QLabel(
             tr(
-                "The paths of the command and of the driver are only needed where they are not found by themselves."
+                "The paths of the command and of the driver are needed only if they are not found automatically."
                 " Key file and record folder are the defaults of the dialogs."
             )
         )

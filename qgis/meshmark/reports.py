@@ -15,11 +15,11 @@ def add_parameters(algorithm):
         QgsProcessingParameterFileDestination(
             "REPORT", tr("Report"), tr("HTML files (*.html)"), optional=True, createByDefault=True
         ),
-        tr("A report to read, print and hand on; it holds no secret."),
+        tr("A report to read, print and pass on; it contains no secret."),
     )
     algorithm.add(
         QgsProcessingParameterBoolean("OPEN_REPORT", tr("Open the report"), True),
-        tr("Shows the report in the web browser when it is written."),
+        tr("Opens the report in the web browser after the run."),
     )
 
 

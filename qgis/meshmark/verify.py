@@ -31,10 +31,10 @@ class Verify(Algorithm):
 
     def about(self):
         return tr(
-            "Says whether a suspect map is a copy that was marked with your key, and whose. Given one record it"
-            " tests that copy, given a folder of records it finds the recipient. The result is a verdict, with the"
-            " probability that a map fits so well by chance, a report, and two layers: an arrow for the displacement of every"
-            " matched vertex, coloured by how well it fits in with its neighbours, and the patches of the mesh with"
+            "Determines whether a suspect map is a copy that was marked with your key, and whose. With one record it"
+            " tests that copy; with a folder of records it finds the recipient. The result is a verdict with the"
+            " probability that a map fits so well by chance, a report, and two layers: an arrow for the displacement"
+            " of every matched vertex, coloured by its agreement with its neighbours, and the patches of the mesh with"
             " the evidence of each."
         )
 
@@ -53,17 +53,17 @@ class Verify(Algorithm):
         self.add(
             QgsProcessingParameterVectorLayer("SUSPECT", tr("Suspect map"), [vector]),
             tr(
-                "The map in question. All layers of its file are used; of a layer with a filter or unsaved edits,"
-                " what it shows."
+                "The map in question. All layers of its file are used; a layer with a filter or unsaved edits is"
+                " used as it is displayed."
             ),
         )
         self.add(
             QgsProcessingParameterFile("KEY", tr("Key file"), defaultValue=settings.get(settings.KEY_FILE) or None),
-            tr("The secret key with which the map was marked. Only its path is handed on."),
+            tr("The secret key with which the map was marked. Only its path is passed on."),
         )
         self.add(
             QgsProcessingParameterFile("RECORD", tr("Record"), optional=True, extension="json"),
-            tr("The record of one copy: is the suspect that copy? It goes before the record folder."),
+            tr("The record of one copy: is the suspect that copy? It takes precedence over the record folder."),
         )
         folder = QgsProcessingParameterFile.Behavior.Folder
         self.add(
@@ -81,8 +81,8 @@ class Verify(Algorithm):
                 "EVIDENCE_MAP", tr("Evidence map"), tr("GeoPackage (*.gpkg)"), optional=True, createByDefault=True
             ),
             tr(
-                "GeoPackage to write the displacements of the matched vertices and the patches to; both are added"
-                " to the project."
+                "The GeoPackage that receives the displacements of the matched vertices and the patches; both are"
+                " added to the project."
             ),
         )
         reports.add_parameters(self)
@@ -163,7 +163,7 @@ def answer(finished, codes, feedback):
     if not isinstance(found, dict) or not {"meshmark_report", "meshmark_comparison"} & found.keys():
         raise QgsProcessingException(
             tr(
-                "{} gave no answer that can be read: is it the command meshmark, and of this version? See Settings >"
+                "The output of {} is not readable: is it the command meshmark, in this version? See Settings >"
                 " Options > meshmark."
             ).format(commands.meshmark())
         )
