@@ -1,17 +1,15 @@
 //! The secret key k_w and what is derived from it.
 
+pub use crate::options::RECIPIENT_BITS;
+
 use crate::{
     Error, Result,
     message::{Message, to_hex},
-    whitening::unwhiten,
 };
 use hmac::{Hmac, KeyInit, Mac};
 use serde::{Deserialize, Serialize};
 use sha2::Sha256;
 use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
-
-/// How long the message of a recipient is.
-pub const RECIPIENT_BITS: usize = 128;
 
 const VERSION: u32 = 1;
 
@@ -80,11 +78,6 @@ impl SecretKey {
     /// The message of a recipient: [`RECIPIENT_BITS`] of a keyed hash of the text.
     pub fn recipient_message(&self, recipient: &str) -> Message {
         Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..RECIPIENT_BITS / 8])
-    }
-
-    /// The message that this key whitens to these bits.
-    pub fn unwhitened(&self, carried: &Message) -> Message {
-        unwhiten(self, carried)
     }
 
     /// As many key-dependent bits as `half` has, for a round of the whitening of messages of so many bits.

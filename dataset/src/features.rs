@@ -1,6 +1,8 @@
 //! Geometries one by one, for comparing two maps feature by feature.
 
-use crate::{CoordinateSystem, Error, Outline, Result, extent::Extent, survey::chosen_layers, turns::turn};
+use crate::{
+    CoordinateSystem, Error, Outline, Result, extent::Extent, selection::chosen_layers, turns::turn,
+};
 use gdal::{Dataset, vector::LayerAccess};
 
 /// One geometry of a dataset.

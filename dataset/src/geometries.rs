@@ -1,7 +1,7 @@
 //! Geometries as chains of vertices.
 
 use crate::{
-    survey::Chains,
+    chains::Chains,
     wkb::{self, Step, WkbError},
 };
 use gdal::vector::Geometry;

@@ -4,6 +4,7 @@
 #![warn(missing_docs)]
 
 mod assumption;
+mod chains;
 mod crs;
 mod crs_wkt;
 pub mod decimals;
@@ -20,6 +21,7 @@ pub mod marking;
 pub mod publication;
 pub mod quality;
 pub mod read_back;
+mod selection;
 mod shapes;
 mod survey;
 mod threads;
@@ -34,10 +36,7 @@ pub use features::{FeatureGeometry, features};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};
 pub use labels::{Dimension, Label};
+pub use selection::{LabelFields, MOST_VERTICES, Selection, Target};
 pub use shapes::Shape;
-/// The most vertices a map may have: their numbers are 32 bits wide.
-pub const MOST_VERTICES: usize = u32::MAX as usize;
-
+pub use survey::{Survey, survey};
 pub use threads::{ThreadPool, threads};
-
-pub use survey::{LabelFields, Selection, Survey, Target, survey};

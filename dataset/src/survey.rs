@@ -2,88 +2,23 @@
 
 use crate::{
     CoordinateSystem, Error, Geometries, Label, Result, Shape,
+    chains::Chains,
     crs::{self, reproject},
     extent::Extent,
-    labels, parse_srs, shapes,
+    labels, parse_srs,
+    selection::{LabelFields, Selection, Target, chosen_layers},
+    shapes,
     turns::turn,
-    wkb::{self, Step},
+    wkb,
 };
 use gdal::{
     Dataset,
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{
-    disjoint_sets::DisjointSets, ground::Ground, map::Map, options::join_list, scale::ScaleLattice,
-    vertices::VertexTable,
+    disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice, vertices::VertexTable,
 };
 use std::collections::BTreeMap;
-
-/// Which attributes become labels. With labels come shapes: both are for registration.
-#[derive(Debug, Clone, Copy)]
-pub enum LabelFields<'a> {
-    /// None, and no shapes: only the vertices are wanted.
-    None,
-    /// Every string and integer field.
-    All,
-    /// The fields of these names.
-    Named(&'a [String]),
-}
-
-impl LabelFields<'_> {
-    pub(crate) fn wants(&self, field: &str) -> bool {
-        match self {
-            LabelFields::None => false,
-            LabelFields::All => true,
-            LabelFields::Named(names) => names.iter().any(|name| name.eq_ignore_ascii_case(field)),
-        }
-    }
-}
-
-/// Which CRS coordinates are read in.
-#[derive(Debug, Clone, Copy)]
-pub enum Target<'a> {
-    /// Their own, which all chosen layers must share.
-    Own,
-    /// This one: layers in another CRS are reprojected.
-    Crs(&'a CoordinateSystem),
-    /// Whatever they are in: the numbers as they stand.
-    Raw,
-}
-
-/// What to read of a dataset, and how.
-#[derive(Clone, Copy)]
-pub struct Selection<'a> {
-    /// Layers that form the map; all when `None`.
-    pub layers: Option<&'a [String]>,
-    /// CRS of a source that has none.
-    pub srs: Option<&'a str>,
-    /// Attributes to take along.
-    pub labels: LabelFields<'a>,
-    /// Which CRS the coordinates shall be in.
-    pub target: Target<'a>,
-    /// Whether to keep what the geometries are made of.
-    pub geometries: bool,
-    /// Refuse a map of more vertices, duplicates included.
-    pub most_vertices: usize,
-    /// What GDAL's last failure was, if there was one since the walk began: drivers end a layer early on a
-    /// read error, and only the process's error handler tells that from its end.
-    pub last_failure: &'a dyn Fn() -> Option<String>,
-}
-
-/// The whole map, without attributes, in its own CRS.
-impl Default for Selection<'_> {
-    fn default() -> Self {
-        Selection {
-            layers: None,
-            srs: None,
-            labels: LabelFields::None,
-            target: Target::Own,
-            geometries: false,
-            most_vertices: crate::MOST_VERTICES,
-            last_failure: &|| None,
-        }
-    }
-}
 
 /// A map as the mark sees it.
 #[derive(Debug)]
@@ -203,8 +138,8 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     };
     let mut chains = walk.chains;
     let (vertices, indices) = VertexTable::indexed(std::mem::take(&mut chains.coords))?;
-    let segments = segments(&indices, &chains.starts);
-    let polygons = polygons(&indices, &chains.starts, &chains.kinds, vertices.len());
+    let segments = chains.segments(&indices);
+    let polygons = chains.polygons(&indices, vertices.len());
     let ground = match crs::ground(crs.as_ref(), &vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
@@ -214,89 +149,6 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
     let (labels, shapes) = (walk.labels, walk.shapes);
     Ok(Survey { vertices, segments, polygons, crs, ground, lattice, labels, shapes, geometries, features })
-}
-
-/// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
-pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
-    let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
-    if known.is_empty() {
-        return Err(Error::NoLayers);
-    }
-    if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
-        return Err(Error::UnknownLayer { name: name.clone(), known: join_list(&known) });
-    }
-    let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
-    Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())
-}
-
-/// Coordinates of rings, lines and points, one after the other.
-#[derive(Clone, Default)]
-pub(crate) struct Chains {
-    coords: Vec<[f64; 2]>,
-    /// Where in `coords` each of them starts, ascending.
-    pub(crate) starts: Vec<u32>,
-    /// What each of them is.
-    pub(crate) kinds: Vec<Step>,
-    /// Which of them is the first of each geometry, ascending.
-    pub(crate) firsts: Vec<u32>,
-    /// The geometries that are more than their chains, by their numbers.
-    pub(crate) others: BTreeMap<u32, Vec<u8>>,
-}
-
-impl Chains {
-    fn begin_geometry(&mut self) {
-        self.firsts.push(self.starts.len() as u32);
-    }
-
-    fn push(&mut self, step: Step, point: [f64; 2]) {
-        if step != Step::Next {
-            self.starts.push(self.coords.len() as u32);
-            self.kinds.push(step);
-        }
-        self.coords.push(point);
-    }
-
-    fn append(&mut self, other: &mut Chains) {
-        let (of_starts, offset) = (self.starts.len() as u32, self.coords.len() as u32);
-        let geometries = self.firsts.len() as u32;
-        let others = std::mem::take(&mut other.others);
-        self.others.extend(others.into_iter().map(|(number, wkb)| (number + geometries, wkb)));
-        self.firsts.extend(other.firsts.drain(..).map(|first| first + of_starts));
-        self.starts.extend(other.starts.drain(..).map(|start| start + offset));
-        self.coords.append(&mut other.coords);
-        self.kinds.append(&mut other.kinds);
-    }
-}
-
-/// Pairs of consecutive vertices: `indices` of every coordinate, `starts` of the chains among them.
-fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
-    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
-    let chains = starts.iter().zip(ends).map(|(&start, end)| &indices[start as usize..end]);
-    let mut segments: Vec<[u32; 2]> = chains
-        .flat_map(|chain| chain.windows(2))
-        .filter(|pair| pair[0] != pair[1])
-        .map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])])
-        .collect();
-    segments.sort_unstable();
-    segments.dedup();
-    segments.shrink_to_fit();
-    segments
-}
-
-/// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
-fn polygons(indices: &[u32], starts: &[u32], kinds: &[Step], vertices: usize) -> Vec<u32> {
-    let mut joined = DisjointSets::new(vertices);
-    let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
-    let mut shell = 0;
-    for ((&start, end), kind) in starts.iter().zip(ends).zip(kinds) {
-        match kind {
-            Step::Shell => shell = indices[start as usize],
-            Step::Hole => {}
-            Step::First | Step::Next => continue,
-        }
-        indices[start as usize..end].iter().for_each(|&v| joined.join(v, shell));
-    }
-    joined.roots()
 }
 
 struct Walk<'a> {
@@ -459,14 +311,6 @@ mod tests {
     };
 
     #[test]
-    fn segments_join_neighbours_of_a_chain_once_and_no_vertex_with_itself() {
-        // A triangle 0 1 2 0, a line 2 1 1 3 along one of its sides, a point 4.
-        let indices = [0, 1, 2, 0, 2, 1, 1, 3, 4];
-        assert_eq!(segments(&indices, &[0, 4, 8]), [[0, 1], [0, 2], [1, 2], [1, 3]]);
-        assert_eq!(segments(&[], &[]), Vec::<[u32; 2]>::new());
-    }
-
-    #[test]
     fn two_layers_of_one_name_are_both_read() {
         let mut dataset =
             DriverManager::get_driver_by_name("Memory").unwrap().create_vector_only("").unwrap();
@@ -482,13 +326,5 @@ mod tests {
             let map = survey(&dataset, &selection).unwrap();
             assert_eq!(map.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }
-    }
-
-    #[test]
-    fn polygons_are_joined_by_shared_vertices_and_to_their_holes_but_not_by_lines() {
-        // A polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to 8, a polygon 9 10 11.
-        let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
-        let kinds = [Step::Shell, Step::Hole, Step::Shell, Step::First, Step::Shell];
-        assert_eq!(polygons(&indices, &[0, 4, 8, 12, 14], &kinds, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
     }
 }

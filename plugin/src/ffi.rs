@@ -4,7 +4,8 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::{Collector, guarded, report, silence_panics},
-    ffi_source::{Borrowed, OwnedSource, strings, text},
+    ffi_source::{Borrowed, OwnedSource},
+    ffi_text::{strings, text},
     marking::{Marking, Request, Source, split_options},
     source_files::{is_being_read, save_copies},
 };

@@ -1,6 +1,7 @@
 //! GDAL's errors: ours go out once, those of what we call are collected, and panics become errors.
 
-use gdal_sys::{CPLErr, CPLErrorNum};
+use crate::error::{Error, Result};
+use gdal_sys::{CPLErr, CPLErrorNum, OGRErr};
 use std::{
     any::Any,
     cell::RefCell,
@@ -121,6 +122,20 @@ pub fn hush() {
 pub fn unhush() {
     // SAFETY: pops the handler that `hush` pushed; without one, GDAL does nothing.
     unsafe { gdal_sys::CPLPopErrorHandler() };
+}
+
+/// Fails with what GDAL reported while `what` was tried, unless its answer is that there was no error.
+pub fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
+    match error {
+        OGRErr::OGRERR_NONE => Ok(()),
+        _ => Err(failure(what(), collector)),
+    }
+}
+
+/// The failure of `what`, with the reason that GDAL gave.
+pub fn failure(what: String, collector: &Collector) -> Error {
+    let reason = collector.first_failure().unwrap_or_else(|| "GDAL gives no reason".into());
+    Error::Writing { what, reason }
 }
 
 unsafe extern "C" fn collect(class: CPLErr::Type, number: CPLErrorNum, message: *const c_char) {

@@ -4,6 +4,7 @@ use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
     ffi_features::Feature,
+    ffi_text::{strings, text},
     marking::Marking,
     source_files::SourceFiles,
 };
@@ -257,28 +258,4 @@ unsafe fn ignore_attributes(layer: OGRLayerH) {
         names.extend([c"OGR_STYLE".as_ptr(), ptr::null()]);
         gdal_sys::OGR_L_SetIgnoredFields(layer, names.as_mut_ptr());
     }
-}
-
-/// The strings of a GDAL list.
-///
-/// # Safety
-/// `list` is null or an array of C strings that ends in null.
-pub unsafe fn strings(list: *const *const c_char) -> Vec<String> {
-    if list.is_null() {
-        return Vec::new();
-    }
-    // SAFETY: every element before the null is a C string.
-    unsafe { (0..).map(|i| *list.add(i)).take_while(|s| !s.is_null()).map(|s| text(s)).collect() }
-}
-
-/// A C string's text; empty for null.
-///
-/// # Safety
-/// `string` is null or a C string.
-pub unsafe fn text(string: *const c_char) -> String {
-    if string.is_null() {
-        return String::new();
-    }
-    // SAFETY: it is a C string.
-    unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned()
 }

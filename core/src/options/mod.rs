@@ -8,16 +8,13 @@ mod table;
 
 pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
-pub use parameters::{Laplacian, Parameters, Shape};
-pub use table::{CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, Spelling, spec};
-
-use crate::{
-    Error, Result,
-    code::Code,
-    key::{RECIPIENT_BITS, SecretKey},
-    message::Message,
-    whitening::whiten,
+pub use parameters::{Code, Laplacian, Parameters, Shape};
+pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
+pub use table::{
+    CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
 };
+
+use crate::{Error, Result, key::SecretKey, message::Message, whitening::whiten};
 
 /// What the mark says: a name, or the bits themselves.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,6 +113,13 @@ impl Options {
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
         })
+    }
+}
+
+impl Default for Parameters {
+    /// Those of a message as long as a recipient's.
+    fn default() -> Self {
+        Options::parse([]).expect("the defaults are legal").parameters
     }
 }
 

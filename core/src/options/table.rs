@@ -1,11 +1,13 @@
 //! The table of the options, and how they are written.
 
-use super::{Laplacian, Shape};
-use crate::code::Code;
+use super::{Code, Laplacian, Shape};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
 /// need minutes and gigabytes a solve.
 pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
+
+/// How long the message of a RECIPIENT is.
+pub const RECIPIENT_BITS: usize = 128;
 
 /// What an option's value must be.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,6 +5,9 @@
 
 mod linework;
 mod overlaps;
+mod sights;
+
+pub use sights::Outlines;
 
 use crate::Outline;
 use meshmark_core::{
@@ -12,33 +15,14 @@ use meshmark_core::{
     scale::Measure,
 };
 use rayon::prelude::*;
-use rstar::{AABB, Envelope};
-use std::{borrow::Cow, collections::BTreeMap};
-
-/// The geometries of a map, numbered; the same numbers before and after.
-#[derive(Clone, Copy)]
-pub struct Outlines<'a> {
-    /// How many.
-    pub count: usize,
-    /// One of them.
-    pub get: &'a (dyn Fn(usize) -> Cow<'a, Outline> + Sync),
-}
+use sights::Sight;
 
 /// A map as GEOS sees it.
 pub struct State {
     /// Of every geometry.
     sights: Vec<Sight>,
-    /// Pairs of valid polygons, the lower number first, with the area they have in common, where there is one, CRS
-    /// units squared.
-    common: BTreeMap<[u32; 2], f64>,
-}
-
-struct Sight {
-    is_valid: bool,
-    /// CRS units squared; 0 without.
-    area: f64,
-    /// Its bounding box, inside out for an empty one.
-    bounds: AABB<[f64; 2]>,
+    /// Of pairs of valid polygons.
+    common: overlaps::CommonAreas,
 }
 
 impl State {
@@ -48,23 +32,6 @@ impl State {
             (0..outlines.count).into_par_iter().map(|number| Sight::of(&(outlines.get)(number))).collect();
         let common = overlaps::common_areas(outlines, &sights);
         State { sights, common }
-    }
-}
-
-impl Sight {
-    fn of(outline: &Outline) -> Self {
-        let mut bounds = AABB::new_empty();
-        outline.chains.iter().flatten().for_each(|point| bounds.merge(&AABB::from_point(*point)));
-        match outline.geometry() {
-            Some(geometry) => {
-                if !outline.is_plain() && !outline.chains.is_empty() {
-                    let whole = geometry.envelope(); // with the bellies of arcs
-                    bounds.merge(&AABB::from_corners([whole.MinX, whole.MinY], [whole.MaxX, whole.MaxY]));
-                }
-                Sight { is_valid: geometry.is_valid(), area: geometry.area(), bounds }
-            }
-            None => Sight { is_valid: false, area: 0.0, bounds },
-        }
     }
 }
 
@@ -116,6 +83,14 @@ impl Comparison<'_> {
         let new: Vec<u32> = new.map(|(number, _)| number).collect();
         let (invalid_before, invalid_after) = (invalid(self.before.1), invalid(self.after.1));
         (Validity { invalid_before, invalid_after, newly_invalid: new.len() }, new)
+    }
+
+    fn overlaps(&self) -> (Overlaps, Vec<[u32; 2]>) {
+        let [before, after] = [self.before.1, self.after.1];
+        let is_valid =
+            |number: u32| [before, after].iter().all(|state| state.sights[number as usize].is_valid);
+        let scale = |number: u32| self.scale(&(self.before.0.get)(number as usize));
+        overlaps::compare([&before.common, &after.common], is_valid, scale, self.grid)
     }
 
     fn areas(&self) -> Areas {
