@@ -78,8 +78,7 @@ unsafe extern "C" fn meshmark_open(
         let (name, options, source) = unsafe { (text(name), strings(options), &mut *source) };
         let opened = request(&options).and_then(|request| {
             let opened = OwnedSource::open(&name, asks_for_native_data(&options))?;
-            // SAFETY: `opened` outlives the borrow.
-            let marking = mark(name.clone(), &request, &unsafe { Borrowed::new(opened.handle()) })?;
+            let marking = mark(name.clone(), &request, &opened.dataset())?;
             marking.write_record(&request)?;
             *source = opened.into_handle();
             Ok(marking)
@@ -97,7 +96,7 @@ fn asks_for_native_data(options: &[String]) -> bool {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) -> *mut Marking {
     guarded(ptr::null_mut(), || {
-        // SAFETY: the shim gives an open dataset and an option list.
+        // SAFETY: the shim gives an option list, and a dataset that stays open during the call.
         let (source, options) = unsafe { (Borrowed::new(source), strings(options)) };
         let name = source.name();
         let marking = request(&options).and_then(|request| {

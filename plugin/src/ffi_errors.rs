@@ -7,6 +7,7 @@ use std::{
     cell::RefCell,
     ffi::{CStr, CString, c_char},
     fmt::Display,
+    marker::PhantomData,
     panic::{self, AssertUnwindSafe},
     sync::{Mutex, PoisonError},
 };
@@ -60,8 +61,8 @@ fn take_panic_place() -> String {
     PANIC_PLACE.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
 }
 
-/// Catches the errors of the GDAL functions that are called while it lives, on this thread.
-pub struct Collector(Box<RefCell<Vec<Caught>>>);
+/// Catches the errors of the GDAL functions that are called while it lives, on this thread, which it cannot leave.
+pub struct Collector(Box<RefCell<Vec<Caught>>>, PhantomData<*const ()>);
 
 struct Caught {
     class: CPLErr::Type,
@@ -78,7 +79,7 @@ impl Collector {
             gdal_sys::CPLPushErrorHandlerEx(Some(collect), user_data);
             gdal_sys::CPLSetCurrentErrorHandlerCatchDebug(0); // those of CPL_DEBUG go their way
         }
-        Collector(caught)
+        Collector(caught, PhantomData)
     }
 
     /// The first failure since the last [`Collector::clear`].

@@ -13,6 +13,7 @@ use gdal_sys::{GDALDatasetH, OGRLayerH};
 use meshmark_dataset::marking::OPEN_OPTIONS;
 use std::{
     ffi::{CStr, CString, c_char, c_void},
+    marker::PhantomData,
     mem::ManuallyDrop,
     ops::Deref,
     path::PathBuf,
@@ -71,8 +72,10 @@ impl OwnedSource {
         ManuallyDrop::new(self).0
     }
 
-    pub fn handle(&self) -> GDALDatasetH {
-        self.0
+    /// The dataset, which lives as long as this.
+    pub fn dataset(&self) -> Borrowed<'_> {
+        // SAFETY: the handle is open, and the borrow of `self` keeps its reference from being given up.
+        unsafe { Borrowed::new(self.0) }
     }
 }
 
@@ -106,8 +109,9 @@ impl View {
         unsafe { &*self.marking }
     }
 
-    pub fn dataset(&self) -> Borrowed {
-        // SAFETY: callers drop it before the view, as its users in this crate do within one function.
+    /// The marked dataset, which lives as long as this.
+    pub fn dataset(&self) -> Borrowed<'_> {
+        // SAFETY: the handle is open, and the borrow of `self` keeps the view from closing it.
         unsafe { Borrowed::new(self.handle) }
     }
 
@@ -154,15 +158,15 @@ fn is_raster(name: &CStr) -> bool {
     known(GdalOpenFlags::GDAL_OF_RASTER) && !known(GdalOpenFlags::GDAL_OF_VECTOR)
 }
 
-/// A dataset of somebody else, for the `gdal` crate: it is not closed here.
-pub struct Borrowed(ManuallyDrop<Dataset>);
+/// A dataset of somebody else, open for `'a`, for the `gdal` crate: it is not closed here.
+pub struct Borrowed<'a>(ManuallyDrop<Dataset>, PhantomData<&'a Dataset>);
 
-impl Borrowed {
+impl Borrowed<'_> {
     /// # Safety
-    /// `handle` is an open dataset and stays so while this lives.
+    /// `handle` is an open dataset and stays so for the lifetime of the result, which the caller chooses.
     pub unsafe fn new(handle: GDALDatasetH) -> Self {
         // SAFETY: the handle is open; ManuallyDrop keeps the wrapper from closing it.
-        Borrowed(ManuallyDrop::new(unsafe { Dataset::from_c_dataset(handle) }))
+        Borrowed(ManuallyDrop::new(unsafe { Dataset::from_c_dataset(handle) }), PhantomData)
     }
 
     pub fn is_meshmark(&self) -> bool {
@@ -214,7 +218,7 @@ impl Borrowed {
     }
 }
 
-impl Deref for Borrowed {
+impl Deref for Borrowed<'_> {
     type Target = Dataset;
     fn deref(&self) -> &Dataset {
         &self.0
@@ -224,7 +228,7 @@ impl Deref for Borrowed {
 /// While it lives, the layers of a dataset yield no attributes.
 pub struct GeometryOnly<'a> {
     layers: Vec<OGRLayerH>,
-    _dataset: &'a Borrowed,
+    _dataset: &'a Borrowed<'a>,
 }
 
 impl Drop for GeometryOnly<'_> {

@@ -6,7 +6,7 @@ use crate::{
     ffi_errors::{guarded, report},
     ffi_features::FeatureRef,
     ffi_output::{Described, Field, LayerSpec},
-    ffi_source::{Borrowed, OwnedSource},
+    ffi_source::Borrowed,
     ffi_text::{strings, text},
     marking::{Request, split_options},
     target::Target,
@@ -174,10 +174,7 @@ unsafe extern "C" fn meshmark_writer_finish(
             (*Box::from_raw(writer), Described::new(described), failure)
         };
         let name = writer.name().to_string();
-        let mark_source = |request: &Request, source: &OwnedSource| {
-            // SAFETY: the source is open during the call.
-            mark(name.clone(), request, &unsafe { Borrowed::new(source.handle()) })
-        };
+        let mark_source = |request: &Request, source: &Borrowed| mark(name.clone(), request, source);
         let finished = writer.finish(&described, host_failure, &mark_source, threads());
         match finished {
             Ok(warnings) => {

@@ -12,7 +12,7 @@ use crate::{
     error::{Error, Result},
     ffi_features::FeatureRef,
     ffi_output::{Described, Field, LayerSpec, Output},
-    ffi_source::{OwnedSource, View},
+    ffi_source::{Borrowed, OwnedSource, View},
     marking::{Marking, Request},
     read_back,
     staged_layer::StagedLayer,
@@ -25,7 +25,7 @@ use meshmark_dataset::{
 use std::{fs, path::Path};
 
 /// Marks an open dataset; the border knows how.
-pub type Mark<'a> = &'a dyn Fn(&Request, &OwnedSource) -> Result<Marking>;
+pub type Mark<'a> = &'a dyn Fn(&Request, &Borrowed) -> Result<Marking>;
 
 /// A dataset under construction.
 pub struct Writer {
@@ -160,7 +160,7 @@ impl Writer {
         staged.commit()?;
         staged.close()?;
         let source = OwnedSource::open(&places.staged.display().to_string(), false)?;
-        let marking = mark(&request, &source)?;
+        let marking = mark(&request, &source.dataset())?;
         let view = View::new(source, marking)?;
         let folder = places.main.subfolder("out")?;
         let file = folder.join(target.file_name());
