@@ -26,7 +26,7 @@ impl Constraints {
     pub(crate) fn find(map: &Map, tree: &VertexTree, shape: Shape) -> Self {
         let mut touches = touches(map, tree);
         let bodies = match shape {
-            Shape::Rigid if !map.polygons.is_empty() => {
+            Shape::Rigid if !map.polygon_roots.is_empty() => {
                 Bodies::find(map, touches.iter().map(|touch| (touch.vertex, touch.segment)))
             }
             _ => Bodies::default(),

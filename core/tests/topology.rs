@@ -28,7 +28,7 @@ struct Sketch {
 struct Town {
     vertices: VertexTable,
     segments: Vec<[u32; 2]>,
-    polygons: Vec<u32>,
+    polygon_roots: Vec<u32>,
 }
 
 impl Town {
@@ -38,8 +38,8 @@ impl Town {
     }
 
     fn map(&self) -> Map<'_> {
-        let Town { vertices, segments, polygons } = self;
-        Map { segments, polygons, ..Map::of_points(vertices, METRES) }
+        let Town { vertices, segments, polygon_roots } = self;
+        Map { segments, polygon_roots, ..Map::of_points(vertices, METRES) }
     }
 
     fn coords(&self) -> &[[f64; 2]] {
@@ -70,13 +70,13 @@ impl Sketch {
         segments.sort_unstable();
         segments.dedup();
         // Along a ring, labels go round in one direction or the other: two passes reach every corner.
-        let mut polygons: Vec<u32> = (0..table.len() as u32).collect();
+        let mut polygon_roots: Vec<u32> = (0..table.len() as u32).collect();
         let there: Vec<[u32; 2]> = self.sides.iter().map(pair).collect();
         for [a, b] in there.iter().chain(there.iter().rev()).chain(&there) {
-            let first = polygons[*a as usize].min(polygons[*b as usize]);
-            (polygons[*a as usize], polygons[*b as usize]) = (first, first);
+            let first = polygon_roots[*a as usize].min(polygon_roots[*b as usize]);
+            (polygon_roots[*a as usize], polygon_roots[*b as usize]) = (first, first);
         }
-        Town { vertices: table, segments, polygons }
+        Town { vertices: table, segments, polygon_roots }
     }
 }
 
@@ -212,7 +212,7 @@ fn rigid_houses_keep_their_shape_and_move_as_far_as_free_ones() {
     let marked = town.mark(&rigid);
     // Sides and diagonals of every house: all distances between vertices of one polygon.
     for i in 0..town.coords().len() {
-        for j in (0..i).filter(|&j| town.polygons[i] == town.polygons[j]) {
+        for j in (0..i).filter(|&j| town.polygon_roots[i] == town.polygon_roots[j]) {
             let before = length(town.coords()[i], town.coords()[j]);
             let after = length(marked.coords[i], marked.coords[j]);
             assert!((after - before).abs() < 1e-6 * before, "{before} became {after}");
@@ -234,7 +234,7 @@ fn a_house_is_never_cut_by_the_border_of_a_patch() {
     for (number, patch) in patches.as_slice().iter().enumerate() {
         patch.vertices.iter().for_each(|&v| patch_of[v as usize] = number);
     }
-    for (v, &first) in town.polygons.iter().enumerate() {
+    for (v, &first) in town.polygon_roots.iter().enumerate() {
         assert_eq!(patch_of[v], patch_of[first as usize]);
     }
     let smallest = patches.as_slice().iter().map(|patch| patch.vertices.len()).min().unwrap();

@@ -63,7 +63,7 @@ impl Chains {
     }
 
     /// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
-    pub(crate) fn polygons(&self, indices: &[u32], vertices: usize) -> Vec<u32> {
+    pub(crate) fn polygon_roots(&self, indices: &[u32], vertices: usize) -> Vec<u32> {
         let mut joined = DisjointSets::new(vertices);
         let mut shell = 0;
         for (chain, kind) in self.ranges(indices.len()).zip(&self.kinds) {
@@ -97,6 +97,6 @@ mod tests {
         let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
         let kinds = vec![Step::Shell, Step::Hole, Step::Shell, Step::First, Step::Shell];
         let chains = Chains { starts: vec![0, 4, 8, 12, 14], kinds, ..Chains::default() };
-        assert_eq!(chains.polygons(&indices, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
+        assert_eq!(chains.polygon_roots(&indices, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
     }
 }

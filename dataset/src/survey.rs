@@ -27,8 +27,9 @@ pub struct Survey {
     pub vertices: VertexTable,
     /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
     pub segments: Vec<[u32; 2]>,
-    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
-    pub polygons: Vec<u32>,
+    /// Of every vertex the first vertex of its polygon group, the polygons that shared vertices join; itself when it is in
+    /// none.
+    pub polygon_roots: Vec<u32>,
     /// Its CRS: the common one of its layers, or the one it was reprojected into.
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and could be in degrees.
@@ -67,8 +68,11 @@ impl Survey {
         segments.sort_unstable();
         segments.dedup();
         let mut joined = DisjointSets::new(vertices.len());
-        indices.iter().zip(&self.polygons).for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
-        let polygons = joined.roots();
+        indices
+            .iter()
+            .zip(&self.polygon_roots)
+            .for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
+        let polygon_roots = joined.roots();
         let places = bring(self.labels.iter().map(|label| label.point).collect())?;
         let in_shapes = bring(self.shapes.iter().flat_map(|shape| shape.vertices.iter().copied()).collect())?;
         let (mut labels, mut shapes) = (self.labels.clone(), self.shapes.clone());
@@ -80,7 +84,7 @@ impl Survey {
         Ok(Survey {
             vertices,
             segments,
-            polygons,
+            polygon_roots,
             crs: Some(crs.clone()),
             ground: Some(ground),
             lattice,
@@ -112,9 +116,9 @@ impl Survey {
     /// # Errors
     /// [`Error::NoCrs`].
     pub fn map(&self) -> Result<Map<'_>> {
-        let Survey { vertices, segments, polygons, .. } = self;
+        let Survey { vertices, segments, polygon_roots, .. } = self;
         let lattice = self.lattice.as_ref();
-        Ok(Map { vertices, segments, polygons, ground: self.ground()?, lattice })
+        Ok(Map { vertices, segments, polygon_roots, ground: self.ground()?, lattice })
     }
 }
 
@@ -139,7 +143,7 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let mut chains = walk.chains;
     let (vertices, indices) = VertexTable::indexed(std::mem::take(&mut chains.coords))?;
     let segments = chains.segments(&indices);
-    let polygons = chains.polygons(&indices, vertices.len());
+    let polygon_roots = chains.polygon_roots(&indices, vertices.len());
     let ground = match crs::ground(crs.as_ref(), &vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,
@@ -148,7 +152,18 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let lattice = crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&vertices, ground));
     let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
     let (labels, shapes) = (walk.labels, walk.shapes);
-    Ok(Survey { vertices, segments, polygons, crs, ground, lattice, labels, shapes, geometries, features })
+    Ok(Survey {
+        vertices,
+        segments,
+        polygon_roots,
+        crs,
+        ground,
+        lattice,
+        labels,
+        shapes,
+        geometries,
+        features,
+    })
 }
 
 struct Walk<'a> {

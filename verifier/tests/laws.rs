@@ -30,7 +30,7 @@ fn random(carried: Message) -> Expected {
 struct Case {
     reference: VertexTable,
     segments: Vec<[u32; 2]>,
-    polygons: Vec<u32>,
+    polygon_roots: Vec<u32>,
     ground: Ground,
     key: SecretKey,
     marked: Vec<[f64; 2]>,
@@ -48,7 +48,7 @@ impl Case {
         Case {
             reference: map.vertices,
             segments: map.segments,
-            polygons: map.polygons,
+            polygon_roots: map.polygon_roots,
             ground,
             key,
             marked: marked.coords,
@@ -58,7 +58,7 @@ impl Case {
     fn map(&self) -> Map<'_> {
         Map {
             segments: &self.segments,
-            polygons: &self.polygons,
+            polygon_roots: &self.polygon_roots,
             ..Map::of_points(&self.reference, self.ground)
         }
     }
