@@ -28,8 +28,8 @@ pub type Observed = [Option<[f64; 2]>];
 
 /// Standard deviation of the shift of a whole patch, metres: as good as free.
 const SHIFT_M: f64 = 1.0;
-/// Displacements are never trusted to better than this.
-const LEAST_NOISE_M: f64 = 0.01;
+/// No displacement is trusted to better than this, metres.
+pub(crate) const LEAST_NOISE_M: f64 = 0.01;
 /// Patches, and vertices of each, on which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
 const SAMPLE_VERTICES: usize = 200;

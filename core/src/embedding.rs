@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     carrier::{Carrier, bit_of_coefficient},
-    deformation::{Deformation, Prediction},
+    deformation::{Deformation, LEAST_NOISE_M, Prediction},
     demodulation::joint_solved,
     distortion::{AngleChange, Corner, Displacement},
     key::SecretKey,
@@ -66,9 +66,6 @@ pub struct Embedding<'a> {
     carriers: usize,
     parameters: &'a Parameters,
 }
-
-/// A displacement is read back as if with this noise at least, metres.
-const LEAST_NOISE_M: f64 = 0.01;
 
 impl<'a> Embedding<'a> {
     /// Meshes the map and cuts it into patches, for messages of so many bits.

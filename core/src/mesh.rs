@@ -1,7 +1,6 @@
 //! The Delaunay mesh that joins all vertices of a map (paper, section 3.1).
 
-use crate::{Error, Result};
-use robust::{Coord, orient2d};
+use crate::{Error, Result, orientation::orientation};
 use spade::{DelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
 use std::collections::HashMap;
 
@@ -92,9 +91,9 @@ fn bits(Point2 { x, y }: Point2<f64>) -> [u64; 2] {
 /// Whether no three points span a triangle, by an exact predicate. The first and the last point
 /// in canonical order are the ends of the line, if there is one.
 fn all_collinear(points: &[Point2<f64>]) -> bool {
-    let coord = |p: &Point2<f64>| Coord { x: p.x, y: p.y };
+    let place = |p: &Point2<f64>| [p.x, p.y];
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return true };
-    points.iter().all(|p| orient2d(coord(first), coord(last), coord(p)) == 0.0)
+    points.iter().all(|p| orientation(place(first), place(last), place(p)) == 0.0)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use meshmark_core::{
     map::Map,
     message::Message,
     options::{Laplacian, Parameters, Shape},
+    orientation::orientation,
     patches::Patches,
     vertices::VertexTable,
 };
@@ -285,10 +286,7 @@ fn a_hole_that_touches_the_wall_stays_inside_to_the_last_bit() {
         contacts.push([shell[3], shell[0], hole[0]]); // with the square on the left of the first two
     }
     let town = sketch.survey();
-    let side = |contact: [[f64; 2]; 3]| {
-        let [a, b, p] = contact.map(|[x, y]| robust::Coord { x, y });
-        robust::orient2d(a, b, p)
-    };
+    let side = |[a, b, p]: [[f64; 2]; 3]| orientation(a, b, p);
     for shape in [Shape::Free, Shape::Rigid] {
         let marked = town.mark(&Parameters { shape, ..parameters() });
         for contact in &contacts {

@@ -17,6 +17,7 @@ pub mod geojson_text;
 mod geometries;
 pub mod geopackage;
 mod labels;
+pub mod marked_view;
 pub mod marking;
 pub mod publication;
 pub mod quality;

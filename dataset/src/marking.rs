@@ -134,10 +134,13 @@ pub fn warnings(
     warnings
 }
 
+/// CSV files keep no column of coordinates as text among the attributes.
+const NO_TEXT_OF_GEOMETRY: &str = "@KEEP_GEOM_COLUMNS=NO";
+
 /// How any map is opened. CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked; of
 /// OpenStreetMap files layers must be read one at a time, whatever the configuration says. With @ an option concerns
 /// only drivers that have it.
-pub const OPEN_OPTIONS: [&str; 2] = ["@KEEP_GEOM_COLUMNS=NO", "@INTERLEAVED_READING=NO"];
+pub const OPEN_OPTIONS: [&str; 2] = [NO_TEXT_OF_GEOMETRY, "@INTERLEAVED_READING=NO"];
 
 /// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
 pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
@@ -148,8 +151,8 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     let (layer, attribute) = dataset.layers().find_map(find)?;
     Some(format!(
         "layer \"{layer}\" has coordinates as text in its attribute \"{attribute}\", which stays as it is: with it \
-         anybody can undo the mark; leave it out, for example with -select, or open a CSV file with \
-         KEEP_GEOM_COLUMNS=NO"
+         anybody can undo the mark; leave it out, for example with -select, or open a CSV file with {}",
+        NO_TEXT_OF_GEOMETRY.trim_start_matches('@')
     ))
 }
 

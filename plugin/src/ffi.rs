@@ -12,6 +12,7 @@ use crate::{
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
 use meshmark_dataset::{
+    marked_view::PREFIX,
     marking::{NotMoved, coordinates_as_text},
     threads,
 };
@@ -240,9 +241,7 @@ pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Markin
 fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
     match marking {
         Ok(mut marking) => {
-            for warning in std::mem::take(&mut marking.warnings) {
-                report(CPLErr::CE_Warning, format!("MESHMARK:{name}: {warning}"));
-            }
+            warn(name, &std::mem::take(&mut marking.warnings));
             Box::into_raw(Box::new(marking))
         }
         Err(error) => {
@@ -252,8 +251,14 @@ fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
     }
 }
 
+/// Emits the one error of a marked view of this name.
 pub fn fail(name: &str, error: &Error) {
-    report(CPLErr::CE_Failure, format!("MESHMARK:{name}: {error}"));
+    report(CPLErr::CE_Failure, format!("{PREFIX}{name}: {error}"));
+}
+
+/// Emits its warnings.
+pub fn warn(name: &str, warnings: &[String]) {
+    warnings.iter().for_each(|warning| report(CPLErr::CE_Warning, format!("{PREFIX}{name}: {warning}")));
 }
 
 pub fn default_key_path() -> Option<String> {

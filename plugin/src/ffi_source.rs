@@ -10,7 +10,7 @@ use crate::{
 };
 use gdal::{Dataset, GdalOpenFlags};
 use gdal_sys::{GDALDatasetH, OGRLayerH};
-use meshmark_dataset::marking::OPEN_OPTIONS;
+use meshmark_dataset::{marked_view, marking::OPEN_OPTIONS};
 use std::{
     ffi::{CStr, CString, c_char, c_void},
     marker::PhantomData,
@@ -25,7 +25,6 @@ unsafe extern "C" {
     fn meshmark_shim_view(source: GDALDatasetH, marking: *mut c_void) -> GDALDatasetH;
 }
 
-const PREFIX: &str = "MESHMARK:";
 const DRIVER: &CStr = c"MESHMARK";
 
 /// A dataset handle that holds one reference and gives it up when dropped.
@@ -38,7 +37,7 @@ impl OwnedSource {
         if name.trim().is_empty() {
             return Err(Error::NoSource);
         }
-        if name.get(..PREFIX.len()).is_some_and(|start| start.eq_ignore_ascii_case(PREFIX)) {
+        if marked_view::is_named_by(name) {
             return Err(Error::Marked("a marked view"));
         }
         let c_name = CString::new(name).expect("it was a C string");

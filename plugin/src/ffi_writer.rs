@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    ffi::{default_key_path, fail, mark},
+    ffi::{default_key_path, fail, mark, warn},
     ffi_errors::{guarded, report},
     ffi_features::FeatureRef,
     ffi_output::{Described, Field, LayerSpec},
@@ -178,7 +178,7 @@ unsafe extern "C" fn meshmark_writer_finish(
         let finished = writer.finish(&described, host_failure, &mark_source, threads());
         match finished {
             Ok(warnings) => {
-                warnings.iter().for_each(|w| report(CPLErr::CE_Warning, format!("MESHMARK:{name}: {w}")));
+                warn(&name, &warnings);
                 true
             }
             Err(error) => {

@@ -9,7 +9,7 @@ use gdal::Dataset;
 use meshmark_core::{
     carrier::Carrier,
     demodulation, embedding,
-    key::SecretKey,
+    key::{SecretKey, read_text},
     options::{Options, Spelling, Subject},
     patches::Patches,
 };
@@ -19,14 +19,10 @@ use meshmark_dataset::{
     marking::{self, Moves, Unmarked},
     same_file, survey,
 };
-use std::{fs::File, io::Read, path::Path};
-use zeroize::Zeroizing;
+use std::{fs::File, path::Path};
 
 /// What GDAL adds to the open options of any driver.
 const HINTS_OF_GDAL: [&str; 3] = ["NATIVE_DATA", "VALIDATE_OPEN_OPTIONS", "NOLOCK"];
-
-/// A key file has 150 bytes; a mistaken /dev/zero has no end.
-const LONGEST_KEY_FILE: u64 = 65_536;
 
 /// Splits NAME=VALUE texts.
 pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
@@ -96,9 +92,7 @@ fn pool(threads: usize) -> Result<ThreadPool> {
 
 fn read_key(path: &str) -> Result<SecretKey> {
     let unreadable = |e: std::io::Error| Error::KeyUnreadable { path: path.into(), reason: e.to_string() };
-    let mut text = Zeroizing::new(String::with_capacity(1024));
-    let file = File::open(path).map_err(unreadable)?;
-    file.take(LONGEST_KEY_FILE).read_to_string(&mut text).map_err(unreadable)?;
+    let text = File::open(path).and_then(read_text).map_err(unreadable)?;
     SecretKey::from_json(&text).map_err(|source| Error::KeyMalformed { path: path.into(), source })
 }
 

@@ -18,9 +18,6 @@ use std::{
     },
 };
 
-/// What SQLite puts beside a database that is being written.
-const SIDECARS: [&str; 2] = ["-journal", "-wal"];
-
 /// Every open source of this process, for [`is_being_read`].
 static OPEN: Mutex<Vec<OpenSource>> = Mutex::new(Vec::new());
 static NEXT_NUMBER: AtomicU64 = AtomicU64::new(0);
@@ -178,8 +175,13 @@ impl OpenSource {
     }
 }
 
+/// What SQLite puts beside a database that is being written.
+pub fn sidecars(path: &Path) -> [PathBuf; 2] {
+    ["-journal", "-wal"].map(|suffix| with_suffix(path, suffix))
+}
+
 fn sidecar_lengths(path: &Path) -> [u64; 2] {
-    SIDECARS.map(|suffix| fs::metadata(with_suffix(path, suffix)).map_or(0, |metadata| metadata.len()))
+    sidecars(path).map(|sidecar| fs::metadata(sidecar).map_or(0, |metadata| metadata.len()))
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

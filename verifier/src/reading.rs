@@ -4,19 +4,20 @@ use crate::{Error, Result, report::printable};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{
     ground::Ground,
-    key::SecretKey,
+    key::{SecretKey, read_text},
     options::{Options, Spelling},
     record::Record,
     scale::ScaleLattice,
 };
 use meshmark_dataset::{
     CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
-    marking, survey,
+    marked_view, marking, survey,
 };
 use std::{
     cell::RefCell,
     collections::BTreeSet,
-    io::Read,
+    fs::File,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -37,9 +38,6 @@ const SUSPECT_DRIVERS: &[&str] = &[
     "SQLite",
     "TopoJSON",
 ];
-
-/// Keys and records are a few hundred bytes; a mistaken /dev/zero has no end.
-const LONGEST_TEXT: u64 = 1 << 20;
 
 thread_local! {
     /// GDAL's last error message on this thread, kept instead of printed.
@@ -67,7 +65,7 @@ pub(crate) fn forget_failure() {
 
 /// Reads a key file.
 pub fn key(path: &Path) -> Result<SecretKey> {
-    let text = zeroize::Zeroizing::new(text("key", path)?);
+    let text = text("key", path)?;
     SecretKey::from_json(&text).map_err(|error| Error::Usage(format!("{}: {error}", path.display())))
 }
 
@@ -77,17 +75,10 @@ pub fn record(path: &Path) -> Result<Record> {
         .map_err(|error| Error::Usage(format!("{}: {error}", path.display())))
 }
 
-fn text(what: &str, path: &Path) -> Result<String> {
+fn text(what: &str, path: &Path) -> Result<zeroize::Zeroizing<String>> {
     let unreadable =
-        |reason: String| Error::Usage(format!("the {what} {} cannot be read: {reason}", path.display()));
-    let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
-    let mut text = String::new();
-    let mut longest = file.take(LONGEST_TEXT + 1);
-    longest.read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
-    match text.len() as u64 {
-        0..=LONGEST_TEXT => Ok(text),
-        _ => Err(unreadable(format!("it is longer than the {LONGEST_TEXT} bytes of any key or record"))),
-    }
+        |error: io::Error| Error::Usage(format!("the {what} {} cannot be read: {error}", path.display()));
+    File::open(path).and_then(read_text).map_err(unreadable)
 }
 
 /// How to read a map.
@@ -117,7 +108,7 @@ pub(crate) fn source(
     options: &Options,
     warn: &mut dyn FnMut(&str),
 ) -> Result<(Dataset, Survey)> {
-    if path.as_os_str().as_encoded_bytes().get(..9).is_some_and(|p| p.eq_ignore_ascii_case(b"MESHMARK:")) {
+    if marked_view::is_named_by(path) {
         let path = path.display();
         return Err(Error::Usage(format!(
             "the map {path} is a marked view already: name the dataset itself"
