@@ -66,7 +66,7 @@ impl Bodies {
     }
 
     /// The number of the body a vertex belongs to.
-    pub fn of(&self, vertex: u32) -> Option<usize> {
+    pub fn number_at(&self, vertex: u32) -> Option<usize> {
         self.number.get(vertex as usize).filter(|number| **number != FREE).map(|number| *number as usize)
     }
 }

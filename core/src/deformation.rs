@@ -101,7 +101,7 @@ impl Prediction {
         let residual = |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [o[0] - f[0], o[1] - f[1]]);
         let residuals: Vec<[f64; 2]> =
             observed.iter().zip(&self.displacement_m).filter_map(residual).collect();
-        let law = NoiseLaw::of(residuals.as_flattened());
+        let law = NoiseLaw::fit(residuals.as_flattened());
         let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
         if law.exponent == 2.0 || self.deformation.noise_m < WEAK_MARK * mark_m {
             return (observed.to_vec(), self);

@@ -10,7 +10,7 @@ use crate::{
     map::Map,
     message::Message,
     nearness::VertexTree,
-    options::{Parameters, Shape},
+    options::{Parameters, Rigidity},
     patches::{Patch, Patches},
     placement::Placement,
     response::Response,
@@ -149,8 +149,8 @@ impl<'a> Embedding<'a> {
     ) -> Result<Vec<Vec<[f64; 2]>>> {
         let basis = Basis::known_or_solved(&self.bases, number, patch, self.carriers + 1)?;
         let gain = match self.parameters.shape {
-            Shape::Free => 1.0,
-            Shape::Rigid => {
+            Rigidity::Free => 1.0,
+            Rigidity::Rigid => {
                 let carriers = basis.vectors.subcols(1, self.carriers);
                 Response::new(patch, carriers.to_owned()).gain(patch, carriers.to_owned())
             }

@@ -29,17 +29,17 @@ impl Mesh {
         let triangulation: DelaunayTriangulation<Point2<f64>> =
             DelaunayTriangulation::bulk_load_stable(points.clone())
                 .expect("coordinates are finite, not tiny and below 1e30");
-        let number = Numbering::new(&points, &triangulation);
+        let numbering = Numbering::new(&points, &triangulation);
         let mut edges: Vec<[u32; 2]> = triangulation
             .undirected_edges()
             .map(|edge| {
-                let [a, b] = edge.vertices().map(|v| number.of(v.fix().index(), v.position()));
+                let [a, b] = edge.vertices().map(|v| numbering.vertex(v.fix().index(), v.position()));
                 [a.min(b), a.max(b)]
             })
             .collect();
         edges.sort_unstable();
         let corners = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, _, _, _, _>| {
-            face.vertices().map(|v| number.of(v.fix().index(), v.position()))
+            face.vertices().map(|v| numbering.vertex(v.fix().index(), v.position()))
         };
         let triangles = triangulation.inner_faces().map(corners).collect();
         Ok(Mesh { edges, triangles })
@@ -76,7 +76,7 @@ impl Numbering {
         Numbering::ByPosition(first)
     }
 
-    fn of(&self, index: usize, position: Point2<f64>) -> u32 {
+    fn vertex(&self, index: usize, position: Point2<f64>) -> u32 {
         match self {
             Numbering::Same => index as u32,
             Numbering::ByPosition(first) => first[&bits(position)],

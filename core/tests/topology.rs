@@ -7,7 +7,7 @@ use meshmark_core::{
     key::SecretKey,
     map::Map,
     message::Message,
-    options::{Laplacian, Parameters, Shape},
+    options::{Laplacian, Parameters, Rigidity},
     orientation::orientation,
     patches::Patches,
     vertices::VertexTable,
@@ -125,8 +125,8 @@ fn small_town() -> Sketch {
     town(&(0..30).map(block).collect::<Vec<_>>())
 }
 
-fn shapes() -> impl Strategy<Value = Shape> {
-    prop_oneof![Just(Shape::Free), Just(Shape::Rigid)]
+fn shapes() -> impl Strategy<Value = Rigidity> {
+    prop_oneof![Just(Rigidity::Free), Just(Rigidity::Rigid)]
 }
 
 fn laplacians() -> impl Strategy<Value = Laplacian> {
@@ -209,7 +209,7 @@ proptest! {
 #[test]
 fn rigid_houses_keep_their_shape_and_move_as_far_as_free_ones() {
     let town = small_town().survey();
-    let rigid = Parameters { shape: Shape::Rigid, ..parameters() };
+    let rigid = Parameters { shape: Rigidity::Rigid, ..parameters() };
     let marked = town.mark(&rigid);
     // Sides and diagonals of every house: all distances between vertices of one polygon.
     for i in 0..town.coords().len() {
@@ -228,7 +228,7 @@ fn rigid_houses_keep_their_shape_and_move_as_far_as_free_ones() {
 #[test]
 fn a_house_is_never_cut_by_the_border_of_a_patch() {
     let town = small_town().survey();
-    let patches = Patches::new(&town.map(), &Parameters { shape: Shape::Rigid, ..parameters() }).unwrap();
+    let patches = Patches::new(&town.map(), &Parameters { shape: Rigidity::Rigid, ..parameters() }).unwrap();
     patches.validate().unwrap();
     assert!(patches.as_slice().len() > 4);
     let mut patch_of = vec![0; town.coords().len()];
@@ -287,7 +287,7 @@ fn a_hole_that_touches_the_wall_stays_inside_to_the_last_bit() {
     }
     let town = sketch.survey();
     let side = |[a, b, p]: [[f64; 2]; 3]| orientation(a, b, p);
-    for shape in [Shape::Free, Shape::Rigid] {
+    for shape in [Rigidity::Free, Rigidity::Rigid] {
         let marked = town.mark(&Parameters { shape, ..parameters() });
         for contact in &contacts {
             let moved = contact.map(|vertex| marked.coords[town.vertices.index_of(vertex).unwrap()]);
@@ -311,5 +311,5 @@ fn where_nothing_is_rigid_rigid_shapes_are_free_ones() {
     }
     let town = sketch.survey();
     let marked = |shape| town.mark(&Parameters { shape, ..parameters() });
-    assert_eq!(marked(Shape::Rigid).coords, marked(Shape::Free).coords);
+    assert_eq!(marked(Rigidity::Rigid).coords, marked(Rigidity::Free).coords);
 }

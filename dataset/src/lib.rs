@@ -37,7 +37,7 @@ pub use features::{FeatureGeometry, features};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};
 pub use labels::{Dimension, Label};
-pub use selection::{LabelFields, MOST_VERTICES, Selection, Target};
+pub use selection::{LabelFields, MOST_VERTICES, Selection, TargetCrs};
 pub use shapes::Shape;
 pub use survey::{Survey, survey};
 pub use threads::{ThreadPool, threads};

@@ -2,7 +2,7 @@
 
 use crate::{
     CoordinateSystem, Error, Geometries, Result, Survey,
-    quality::{Comparison, Outlines, Quality, State},
+    quality::{BeforeAfter, Outlines, Quality, State},
     turns::turn,
     wkb,
 };
@@ -33,7 +33,7 @@ pub struct Moves<'a> {
 
 impl Moves<'_> {
     /// Where a vertex goes; none when it is no vertex of the map.
-    pub fn of(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn destination(&self, point: [f64; 2]) -> Option<[f64; 2]> {
         self.from.index_of(point).map(|index| self.to[index])
     }
 
@@ -45,7 +45,7 @@ impl Moves<'_> {
         let mut count = 0;
         wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
             count += 1;
-            self.of(point).ok_or(NotMoved::UnknownVertex(point))
+            self.destination(point).ok_or(NotMoved::UnknownVertex(point))
         })?;
         Ok(count)
     }
@@ -191,7 +191,8 @@ impl<'a> Unmarked<'a> {
     /// Looks at all geometries of a map.
     pub fn new(geometries: &'a Geometries, map: &Map<'a>) -> Self {
         let coords = map.vertices.coords();
-        let state = State::of(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
+        let state =
+            State::measure(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
         Unmarked { geometries, coords, measure: map.measure(), state }
     }
 
@@ -200,10 +201,14 @@ impl<'a> Unmarked<'a> {
         let get_before = |number| Cow::Owned(self.geometries.outline(number, self.coords));
         let get_after = |number| Cow::Owned(self.geometries.outline(number, &marked.coords));
         let [before, after] = [outlines(self.geometries, &get_before), outlines(self.geometries, &get_after)];
-        let state = State::of(after);
+        let state = State::measure(after);
         let grid = parameters.precision.unwrap_or(0.0);
-        let comparison =
-            Comparison { before: (before, &self.state), after: (after, &state), measure: self.measure, grid };
+        let comparison = BeforeAfter {
+            before: (before, &self.state),
+            after: (after, &state),
+            measure: self.measure,
+            grid,
+        };
         let Quality { areas, hausdorff, validity, overlaps, .. } = comparison.quality();
         Distortion {
             displacement: marked.displacement,

@@ -30,7 +30,7 @@ impl LabelFields<'_> {
 
 /// Which CRS coordinates are read in.
 #[derive(Debug, Clone, Copy)]
-pub enum Target<'a> {
+pub enum TargetCrs<'a> {
     /// Their own, which all chosen layers must share.
     Own,
     /// This one: layers in another CRS are reprojected.
@@ -49,7 +49,7 @@ pub struct Selection<'a> {
     /// Attributes to take along.
     pub labels: LabelFields<'a>,
     /// Which CRS the coordinates shall be in.
-    pub target: Target<'a>,
+    pub target: TargetCrs<'a>,
     /// Whether to keep what the geometries are made of.
     pub geometries: bool,
     /// Refuse a map of more vertices, duplicates included.
@@ -66,7 +66,7 @@ impl Default for Selection<'_> {
             layers: None,
             srs: None,
             labels: LabelFields::None,
-            target: Target::Own,
+            target: TargetCrs::Own,
             geometries: false,
             most_vertices: MOST_VERTICES,
             last_failure: &|| None,

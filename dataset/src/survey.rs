@@ -6,7 +6,7 @@ use crate::{
     crs::{self, reproject},
     extent::Extent,
     labels, parse_srs,
-    selection::{LabelFields, Selection, Target, chosen_layers},
+    selection::{LabelFields, Selection, TargetCrs, chosen_layers},
     shapes,
     turns::turn,
     wkb,
@@ -137,8 +137,8 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         features.insert(*index, walk.layer(&mut dataset.layer(*index)?, name)?);
     }
     let crs = match selection.target {
-        Target::Crs(target) => Some(target.clone()),
-        Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
+        TargetCrs::Crs(target) => Some(target.clone()),
+        TargetCrs::Own | TargetCrs::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
     let mut chains = walk.chains;
     let (vertices, indices) = VertexTable::indexed(std::mem::take(&mut chains.coords))?;
@@ -186,8 +186,8 @@ impl Walk<'_> {
             features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
                 let extent = match self.selection.target {
-                    Target::Own => Extent::of(columns[column].as_ref()),
-                    Target::Crs(_) | Target::Raw => Extent::ANY, // its CRS may be another than it says
+                    TargetCrs::Own => Extent::in_crs(columns[column].as_ref()),
+                    TargetCrs::Crs(_) | TargetCrs::Raw => Extent::ANY, // its CRS may be another than it says
                 };
                 read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
             }
@@ -203,13 +203,13 @@ impl Walk<'_> {
         }
         for (crs, chains) in columns.iter().zip(&mut of_column) {
             match self.selection.target {
-                Target::Crs(target) => reproject(&mut chains.coords, crs.as_ref(), target, name)?,
-                Target::Own if !chains.coords.is_empty() => self.check_crs(name, crs)?,
-                Target::Own | Target::Raw => {}
+                TargetCrs::Crs(target) => reproject(&mut chains.coords, crs.as_ref(), target, name)?,
+                TargetCrs::Own if !chains.coords.is_empty() => self.check_crs(name, crs)?,
+                TargetCrs::Own | TargetCrs::Raw => {}
             }
             self.chains.append(chains);
         }
-        if let (Target::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
+        if let (TargetCrs::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
             let labels = &mut self.labels[first_label..];
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             reproject(&mut points, crs.as_ref(), target, name)?;

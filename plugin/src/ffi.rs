@@ -6,7 +6,7 @@ use crate::{
     ffi_errors::{Collector, guarded, report, silence_panics},
     ffi_source::{Borrowed, OwnedSource},
     ffi_text::{strings, text},
-    marking::{Marking, Request, Source, split_options},
+    marking::{Marking, MarkingRequest, Source, split_options},
     source_files::{is_being_read, save_copies},
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
@@ -215,13 +215,13 @@ extern "C" fn meshmark_creation_option_list() -> *const c_char {
 
 // --- helpers -------------------------------------------------------------------------------------
 
-fn request(options: &[String]) -> Result<Request> {
-    Request::new(&split_options(options)?, default_key_path())
+fn request(options: &[String]) -> Result<MarkingRequest> {
+    MarkingRequest::new(&split_options(options)?, default_key_path())
 }
 
 /// Marks the dataset, with GDAL's own messages collected instead of emitted: streaming will emit
 /// those that matter again.
-pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Marking> {
+pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
     }

@@ -8,7 +8,7 @@ use crate::{
     ffi_output::{Described, Field, LayerSpec},
     ffi_source::Borrowed,
     ffi_text::{strings, text},
-    marking::{Request, split_options},
+    marking::{MarkingRequest, split_options},
     target::Target,
     writer::Writer,
 };
@@ -65,7 +65,7 @@ fn new_writer(name: &str, options: &[String]) -> Result<Writer> {
     if name.contains(char::REPLACEMENT_CHARACTER) {
         return Err(Error::NotUtf8("the name of the target".into()));
     }
-    let request = Request::new(&marking, default_key_path())?;
+    let request = MarkingRequest::new(&marking, default_key_path())?;
     Writer::new(Target::new(name, &creation)?, request)
 }
 
@@ -174,7 +174,7 @@ unsafe extern "C" fn meshmark_writer_finish(
             (*Box::from_raw(writer), Described::new(described), failure)
         };
         let name = writer.name().to_string();
-        let mark_source = |request: &Request, source: &Borrowed| mark(name.clone(), request, source);
+        let mark_source = |request: &MarkingRequest, source: &Borrowed| mark(name.clone(), request, source);
         let finished = writer.finish(&described, host_failure, &mark_source, threads());
         match finished {
             Ok(warnings) => {

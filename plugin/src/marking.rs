@@ -14,7 +14,7 @@ use meshmark_core::{
     patches::Patches,
 };
 use meshmark_dataset::{
-    LabelFields, MOST_VERTICES, Selection, Survey, Target, ThreadPool,
+    LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, ThreadPool,
     decimals::Digits,
     marking::{self, Moves, Unmarked},
     same_file, survey,
@@ -38,14 +38,14 @@ pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
 }
 
 /// The options of one marking, checked as far as that is possible without the map.
-pub struct Request {
+pub struct MarkingRequest {
     options: Options,
     subject: Subject,
     key: SecretKey,
     key_path: String,
 }
 
-impl Request {
+impl MarkingRequest {
     /// Parses the options and reads the key file. `default_key_path` serves when no KEY is given.
     pub fn new(pairs: &[(String, String)], default_key_path: Option<String>) -> Result<Self> {
         let ours =
@@ -61,7 +61,7 @@ impl Request {
                 return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
-        Ok(Request { options, subject, key, key_path })
+        Ok(MarkingRequest { options, subject, key, key_path })
     }
 
     /// Makes it choose layers by the names they have where they are staged; those that have none are left to be found missing.
@@ -124,7 +124,7 @@ pub struct Marking {
 
 impl Marking {
     /// Surveys the source, and computes every vertex's new place on `threads` threads.
-    pub fn new(request: &Request, source: Source, threads: usize) -> Result<Self> {
+    pub fn new(request: &MarkingRequest, source: Source, threads: usize) -> Result<Self> {
         let options = &request.options;
         check_record_is_no_source(options, &source.files)?;
         output::check_is_not_source(&source.files)?;
@@ -159,7 +159,7 @@ impl Marking {
     }
 
     /// Writes the record where the request wants it.
-    pub fn write_record(&self, request: &Request) -> Result<()> {
+    pub fn write_record(&self, request: &MarkingRequest) -> Result<()> {
         let wanted = request.record_path().zip(self.record.as_deref());
         wanted.map_or(Ok(()), |(path, text)| record_file::write(path, text))
     }
@@ -168,7 +168,7 @@ impl Marking {
     /// somebody read them, in canonical order.
     pub fn check_message(
         &self,
-        request: &Request,
+        request: &MarkingRequest,
         found: &[[f64; 2]],
         digits: Digits,
         threads: usize,
@@ -231,7 +231,7 @@ fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<Stri
         layers: options.layers.as_deref(),
         srs: options.srs.as_deref(),
         labels: LabelFields::None,
-        target: Target::Own,
+        target: TargetCrs::Own,
         geometries: options.record_path.is_some(),
         most_vertices: MOST_VERTICES,
         last_failure,

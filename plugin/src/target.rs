@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    marking::Request,
+    marking::MarkingRequest,
     source_files::sidecars,
 };
 use meshmark_core::options::Creation;
@@ -82,7 +82,7 @@ impl Target {
     }
 
     /// Makes the workplaces, which removes what killed processes left, and checks that nothing is in the way.
-    pub fn places(&self, request: &Request) -> Result<Places> {
+    pub fn places(&self, request: &MarkingRequest) -> Result<Places> {
         if same_file(&self.path, request.key_path()) {
             return Err(Error::SameFile { option: "KEY", other: "the target" });
         }

@@ -10,7 +10,7 @@ use meshmark_core::{
     scale::ScaleLattice,
 };
 use meshmark_dataset::{
-    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, features,
     marked_view, marking, survey,
 };
 use std::{
@@ -99,7 +99,7 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     if let LabelFields::Named(names) = reading.landmarks {
         check_fields(path, &dataset, names)?;
     }
-    read("reference", path, &dataset, reading, Target::Own)
+    read("reference", path, &dataset, reading, TargetCrs::Own)
 }
 
 /// Opens a map to be marked, and reads its vertices.
@@ -117,7 +117,7 @@ pub(crate) fn source(
     let dataset = open("map", path, None)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
-    let survey = read("map", path, &dataset, &reading, Target::Own)?;
+    let survey = read("map", path, &dataset, &reading, TargetCrs::Own)?;
     marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
     Ok((dataset, survey))
 }
@@ -179,20 +179,20 @@ pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Sus
     let layer_crs = crs_of(&dataset);
     let crs = first_crs(&dataset);
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
-        match survey_of(&dataset, reading, Target::Crs(target)) {
+        match survey_of(&dataset, reading, TargetCrs::Crs(target)) {
             Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
             // PROJ, or the limits of what a map may be: the CRS is not that of the coordinates.
             Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
             Err(error) => return Err(failed("suspect", path, error)),
         }
     }
-    let map = read("suspect", path, &dataset, reading, Target::Raw)?;
+    let map = read("suspect", path, &dataset, reading, TargetCrs::Raw)?;
     Ok(Suspect { map, is_raw: true, layer_crs, crs })
 }
 
 /// Reads the numbers of the suspect as they stand.
 pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
-    read("suspect", path, &open_suspect(path)?, reading, Target::Raw)
+    read("suspect", path, &open_suspect(path)?, reading, TargetCrs::Raw)
 }
 
 fn open_suspect(path: &Path) -> Result<Dataset> {
@@ -340,11 +340,11 @@ fn holds_password(path: &Path) -> bool {
             || of_url().is_some_and(|(user, _)| user.contains(':')))
 }
 
-fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: Target) -> Result<Survey> {
+fn read(what: &str, path: &Path, dataset: &Dataset, reading: &Reading, target: TargetCrs) -> Result<Survey> {
     survey_of(dataset, reading, target).map_err(|error| failed(what, path, error))
 }
 
-fn survey_of(dataset: &Dataset, reading: &Reading, target: Target) -> meshmark_dataset::Result<Survey> {
+fn survey_of(dataset: &Dataset, reading: &Reading, target: TargetCrs) -> meshmark_dataset::Result<Survey> {
     forget_failure();
     let selection = Selection {
         layers: reading.layers,

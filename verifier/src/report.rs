@@ -14,7 +14,7 @@ use meshmark_core::{
     code::{Code, Decoder},
     demodulation::Demodulation,
     message::Message,
-    options::{Laplacian, Shape},
+    options::{Laplacian, Rigidity},
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -117,7 +117,7 @@ pub struct ReportParameters {
     pub amplitude_m: f64,
     pub code: Code,
     pub chip_rate: usize,
-    pub shape: Shape,
+    pub shape: Rigidity,
     pub basis: Laplacian,
     pub patch_size: usize,
     pub tolerance_m: f64,

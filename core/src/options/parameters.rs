@@ -16,7 +16,7 @@ pub struct Parameters {
     /// No vertex moves further, metres on the ground.
     pub tolerance_m: f64,
     /// What moves as one.
-    pub shape: Shape,
+    pub shape: Rigidity,
     /// Which functions carry the mark.
     pub laplacian: Laplacian,
     /// Grid of the marked coordinates, CRS units.
@@ -76,19 +76,19 @@ impl Code {
 /// Which vertices move as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Shape {
+pub enum Rigidity {
     /// None but what hangs on others.
     Free,
     /// Those of a building: a group of polygons that share vertices or walls, see [`crate::bodies`].
     Rigid,
 }
 
-impl Shape {
+impl Rigidity {
     /// What SHAPE may be.
     pub const NAMES: [&str; 2] = ["FREE", "RIGID"];
 
     pub(super) fn from_name(name: &str) -> Option<Self> {
-        [Shape::Free, Shape::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
+        [Rigidity::Free, Rigidity::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
     }
 
     /// The option's value.

@@ -1,6 +1,6 @@
 //! The table of the options, and how they are written.
 
-use super::{Code, Laplacian, Shape};
+use super::{Code, Laplacian, Rigidity};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
 /// need minutes and gigabytes a solve.
@@ -162,7 +162,7 @@ pub const OPTIONS: &[OptionSpec] = &[
     ),
     row(
         "SHAPE",
-        Kind::Choice(&Shape::NAMES),
+        Kind::Choice(&Rigidity::NAMES),
         Some("FREE"),
         true,
         "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them",

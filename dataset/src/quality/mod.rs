@@ -27,9 +27,11 @@ pub struct State {
 
 impl State {
     /// Looks at all geometries.
-    pub fn of(outlines: Outlines) -> Self {
-        let sights: Vec<Sight> =
-            (0..outlines.count).into_par_iter().map(|number| Sight::of(&(outlines.get)(number))).collect();
+    pub fn measure(outlines: Outlines) -> Self {
+        let sights: Vec<Sight> = (0..outlines.count)
+            .into_par_iter()
+            .map(|number| Sight::measure(&(outlines.get)(number)))
+            .collect();
         let common = overlaps::common_areas(outlines, &sights);
         State { sights, common }
     }
@@ -53,7 +55,7 @@ pub struct Quality {
 }
 
 /// A map before and after.
-pub struct Comparison<'a> {
+pub struct BeforeAfter<'a> {
     /// The geometries before, and what they look like.
     pub before: (Outlines<'a>, &'a State),
     /// The geometries after, and what they look like.
@@ -64,7 +66,7 @@ pub struct Comparison<'a> {
     pub grid: f64,
 }
 
-impl Comparison<'_> {
+impl BeforeAfter<'_> {
     /// Compares.
     pub fn quality(&self) -> Quality {
         let (validity, newly_invalid) = self.validity();
@@ -97,7 +99,7 @@ impl Comparison<'_> {
         let polygons = self.sights().filter(|(before, _)| before.area > 0.0);
         let changes: Vec<f64> = polygons.map(|(a, b)| (b.area - a.area).abs() / a.area).collect();
         let polygons = changes.len();
-        let spread = Spread::of(changes);
+        let spread = Spread::summarise(changes);
         Areas { polygons, mean_change: spread.mean, p99_change: spread.p99, max_change: spread.max }
     }
 
@@ -106,7 +108,7 @@ impl Comparison<'_> {
             let (before, after) = ((self.before.0.get)(number), (self.after.0.get)(number));
             linework::hausdorff(&before, &after, self.scale(&before))
         };
-        let spread = Spread::of((0..self.before.0.count).into_par_iter().map(each).collect());
+        let spread = Spread::summarise((0..self.before.0.count).into_par_iter().map(each).collect());
         Hausdorff { p99_m: spread.p99, max_m: spread.max }
     }
 

@@ -99,7 +99,7 @@ fn are_apart(one: &Option<Linework>, other: &Option<Linework>) -> bool {
 }
 
 /// Overlaps among polygons that are valid before and after, and which are new. `common` are the common areas before
-/// and after, `scale` metres per unit at a polygon, `grid` as in [`super::Comparison`].
+/// and after, `scale` metres per unit at a polygon, `grid` as in [`super::BeforeAfter`].
 pub(super) fn compare(
     common: [&CommonAreas; 2],
     is_valid: impl Fn(u32) -> bool,
@@ -151,7 +151,7 @@ impl Overlap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quality::{Comparison, Quality, State};
+    use crate::quality::{BeforeAfter, Quality, State};
     use gdal::vector::Geometry;
     use meshmark_core::{ground::Ground, scale::Measure};
     use std::borrow::Cow;
@@ -167,9 +167,9 @@ mod tests {
             [&before, &after].map(|all| move |number: usize| Cow::Borrowed(&all[number]));
         let before = Outlines { count: before.len(), get: &get_before };
         let after = Outlines { count: after.len(), get: &get_after };
-        let (states, ground) = ([before, after].map(State::of), Ground::Plane { metres_per_unit: 1.0 });
+        let (states, ground) = ([before, after].map(State::measure), Ground::Plane { metres_per_unit: 1.0 });
         let measure = Measure { ground, lattice: None };
-        Comparison { before: (before, &states[0]), after: (after, &states[1]), measure, grid }.quality()
+        BeforeAfter { before: (before, &states[0]), after: (after, &states[1]), measure, grid }.quality()
     }
 
     fn square(x: f64, y: f64, size: f64) -> String {

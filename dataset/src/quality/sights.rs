@@ -23,7 +23,7 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    pub(super) fn of(outline: &Outline) -> Self {
+    pub(super) fn measure(outline: &Outline) -> Self {
         let mut bounds = AABB::new_empty();
         outline.chains.iter().flatten().for_each(|point| bounds.merge(&AABB::from_point(*point)));
         match outline.geometry() {
