@@ -199,7 +199,9 @@ impl<'a> Embedding<'a> {
         std::iter::once(0.0).chain(modulated).collect()
     }
 
-    /// Reads the message back as the verifier does, from as many patches as it takes.
+    /// Reads the message back as the verifier does by default, from as many patches as it takes: by the joint
+    /// demodulator, as the noise of the grid and of the constraints is known here. The driver reads a written file back
+    /// by [`crate::demodulation::paper`], which needs no estimate of the noise that the digits of a format add.
     fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
         let from = self.map.vertices.coords().iter();
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));

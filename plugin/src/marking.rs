@@ -166,6 +166,11 @@ impl Marking {
 
     /// Fails unless the message can be demodulated from where the vertices were found: their new places as
     /// somebody read them, in canonical order.
+    ///
+    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are no erasures for
+    /// [`demodulation::joint`] to leave out, and the noise that it would weigh, the rounding to the digits of the
+    /// format, has no estimate here. [`embedding`] knows the noise of its own grid and uses `joint`. The two checks
+    /// stay different because either demodulator refuses other outputs than the other one.
     pub fn check_message(
         &self,
         request: &MarkingRequest,
