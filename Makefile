@@ -123,6 +123,7 @@ uninstall:
 lint: deps
 	$(CARGO) fmt --all -- --check
 	$(WITH_GDAL) $(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
+	$(WITH_GDAL) $(CARGO) test --release --locked -p meshmark-host-tests --test architecture
 
 deps:
 	@./install-deps.sh

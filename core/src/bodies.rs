@@ -40,17 +40,17 @@ impl Bodies {
     /// The groups of polygons of `map`; `touching` are vertices that lie on segments: a corner on the wall of another
     /// polygon joins the two.
     pub(crate) fn find(map: &Map, touching: impl Iterator<Item = (u32, [u32; 2])>) -> Self {
-        let in_polygon = sizes(map.polygons);
-        let mut groups = DisjointSets::new(map.polygons.len());
-        (0..).zip(map.polygons).for_each(|(v, &first)| groups.join(v, first));
+        let in_polygon = sizes(map.polygon_roots);
+        let mut groups = DisjointSets::new(map.polygon_roots.len());
+        (0..).zip(map.polygon_roots).for_each(|(v, &first)| groups.join(v, first));
         for (vertex, [a, b]) in touching {
-            let wall = map.polygons[a as usize] == map.polygons[b as usize];
-            if wall && [vertex, a].iter().all(|&v| in_polygon[map.polygons[v as usize] as usize] > 1) {
+            let wall = map.polygon_roots[a as usize] == map.polygon_roots[b as usize];
+            if wall && [vertex, a].iter().all(|&v| in_polygon[map.polygon_roots[v as usize] as usize] > 1) {
                 groups.join(vertex, a);
             }
         }
         let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        let mut number = vec![FREE; map.polygons.len()];
+        let mut number = vec![FREE; map.polygon_roots.len()];
         (0..).zip(groups.roots()).for_each(|(v, root)| members.entry(root).or_default().push(v));
         let groups = members.into_values().filter(|members| (2..=MOST_VERTICES).contains(&members.len()));
         let bodies: Vec<Body> = groups.map(|members| Body::new(map, members)).collect();
@@ -66,7 +66,7 @@ impl Bodies {
     }
 
     /// The number of the body a vertex belongs to.
-    pub fn of(&self, vertex: u32) -> Option<usize> {
+    pub fn number_at(&self, vertex: u32) -> Option<usize> {
         self.number.get(vertex as usize).filter(|number| **number != FREE).map(|number| *number as usize)
     }
 }
@@ -138,21 +138,22 @@ mod tests {
     use super::*;
     use crate::{ground::Ground, vertices::VertexTable};
 
-    fn bodies(polygons: &[u32], touching: &[(u32, [u32; 2])]) -> Vec<Vec<u32>> {
-        let coords = (0..polygons.len()).map(|i| [i as f64, (i * i) as f64]).collect();
+    fn bodies(polygon_roots: &[u32], touching: &[(u32, [u32; 2])]) -> Vec<Vec<u32>> {
+        let coords = (0..polygon_roots.len()).map(|i| [i as f64, (i * i) as f64]).collect();
         let vertices = VertexTable::new(coords).unwrap();
         let ground = Ground::Plane { metres_per_unit: 1.0 };
-        let map = Map { vertices: &vertices, segments: &[], polygons, ..Map::of_points(&vertices, ground) };
+        let map =
+            Map { vertices: &vertices, segments: &[], polygon_roots, ..Map::of_points(&vertices, ground) };
         let found = Bodies::find(&map, touching.iter().copied());
         found.as_slice().iter().map(|body| body.members.clone()).collect()
     }
 
     #[test]
     fn polygons_are_one_body_when_a_corner_is_on_a_wall_but_not_when_a_line_is() {
-        let polygons = [0, 0, 0, 3, 3, 3, 6, 7];
-        assert_eq!(bodies(&polygons, &[]), [[0, 1, 2], [3, 4, 5]]);
-        assert_eq!(bodies(&polygons, &[(6, [0, 1]), (5, [6, 7])]), [[0, 1, 2], [3, 4, 5]]);
-        assert_eq!(bodies(&polygons, &[(5, [0, 1])]), [[0, 1, 2, 3, 4, 5]]);
+        let roots = [0, 0, 0, 3, 3, 3, 6, 7];
+        assert_eq!(bodies(&roots, &[]), [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(bodies(&roots, &[(6, [0, 1]), (5, [6, 7])]), [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(bodies(&roots, &[(5, [0, 1])]), [[0, 1, 2, 3, 4, 5]]);
     }
 
     #[test]

@@ -6,31 +6,27 @@
 //! belief propagation and by ordered statistics (M. Fossorier, S. Lin, *Soft-decision decoding of linear
 //! block codes based on ordered statistics*, IEEE Transactions on Information Theory 41, 1995).
 
-use crate::{Error, Result, message::Message};
+pub use crate::options::Code;
+
+use crate::{
+    Error, Result,
+    message::Message,
+    options::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS},
+};
 use labrador_ldpc::LDPCCode;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::ops::BitXor;
 
 const LDPC: LDPCCode = LDPCCode::TC256;
 /// Channel bits of LDPC.
-const N: usize = 256;
+const N: usize = LDPC_CHANNEL_BITS;
 /// Message bits of LDPC.
-const K: usize = 128;
+const K: usize = LDPC_MESSAGE_BITS;
 /// Belief propagation converges within a few dozen rounds or never.
 const MOST_ROUNDS: usize = 100;
 /// How many bits of the most reliable basis may be wrong. Where repetition of the same displacement has 4.8 % wrong
 /// bits, 46 % of the messages are read by belief propagation, 68 % with order 2 and 81 % with order 3.
 const ORDER: usize = 3;
-
-/// A code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Code {
-    /// The channel bits are the message bits.
-    Repetition,
-    /// 128 message bits, 256 channel bits.
-    Ldpc,
-}
 
 /// What read the message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -61,39 +57,6 @@ pub struct Decoded {
 }
 
 impl Code {
-    /// The words of the option CODE.
-    pub const NAMES: [&str; 2] = ["REPETITION", "LDPC"];
-
-    /// The code of this name, in any case.
-    pub fn from_name(name: &str) -> Option<Self> {
-        let index = Self::NAMES.iter().position(|known| known.eq_ignore_ascii_case(name))?;
-        Some([Code::Repetition, Code::Ldpc][index])
-    }
-
-    /// The name in lower case, as records and reports have it.
-    pub fn name(self) -> String {
-        Self::NAMES[self as usize].to_lowercase()
-    }
-
-    /// CODE when it is not given: LDPC for messages it can carry, as it reads more of them from the same
-    /// displacement (docs/evaluation.md).
-    pub fn default_for(message_bits: usize) -> Self {
-        if message_bits == K { Code::Ldpc } else { Code::Repetition }
-    }
-
-    /// CHIP_RATE when it is not given: the same displacement with either code.
-    pub fn default_chip_rate(self) -> usize {
-        2 / self.expansion()
-    }
-
-    /// Channel bits for each message bit.
-    pub(crate) fn expansion(self) -> usize {
-        match self {
-            Code::Repetition => 1,
-            Code::Ldpc => N / K,
-        }
-    }
-
     /// How many channel bits carry a message.
     ///
     /// # Errors

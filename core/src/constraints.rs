@@ -6,7 +6,7 @@ use crate::{
     junctions::{Junctions, touches},
     map::Map,
     nearness::VertexTree,
-    options::Shape,
+    options::Rigidity,
     sides::Touching,
 };
 
@@ -23,16 +23,16 @@ pub struct Constraints {
 
 impl Constraints {
     /// Finds them; `tree` holds all vertices.
-    pub(crate) fn find(map: &Map, tree: &VertexTree, shape: Shape) -> Self {
+    pub(crate) fn find(map: &Map, tree: &VertexTree, shape: Rigidity) -> Self {
         let mut touches = touches(map, tree);
         let bodies = match shape {
-            Shape::Rigid if !map.polygons.is_empty() => {
+            Rigidity::Rigid if !map.polygon_roots.is_empty() => {
                 Bodies::find(map, touches.iter().map(|touch| (touch.vertex, touch.segment)))
             }
             _ => Bodies::default(),
         };
         let touching = touches.iter().map(|touch| (touch.vertex, touch.segment)).collect();
-        touches.retain(|touch| bodies.of(touch.vertex).is_none());
+        touches.retain(|touch| bodies.number_at(touch.vertex).is_none());
         Constraints { junctions: Junctions::new(touches), bodies, touching }
     }
 }

@@ -28,8 +28,8 @@ pub type Observed = [Option<[f64; 2]>];
 
 /// Standard deviation of the shift of a whole patch, metres: as good as free.
 const SHIFT_M: f64 = 1.0;
-/// Displacements are never trusted to better than this.
-const LEAST_NOISE_M: f64 = 0.01;
+/// No displacement is trusted to better than this, metres.
+pub(crate) const LEAST_NOISE_M: f64 = 0.01;
 /// Patches, and vertices of each, on which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
 const SAMPLE_VERTICES: usize = 200;
@@ -101,7 +101,7 @@ impl Prediction {
         let residual = |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [o[0] - f[0], o[1] - f[1]]);
         let residuals: Vec<[f64; 2]> =
             observed.iter().zip(&self.displacement_m).filter_map(residual).collect();
-        let law = NoiseLaw::of(residuals.as_flattened());
+        let law = NoiseLaw::fit(residuals.as_flattened());
         let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
         if law.exponent == 2.0 || self.deformation.noise_m < WEAK_MARK * mark_m {
             return (observed.to_vec(), self);

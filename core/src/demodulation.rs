@@ -22,8 +22,8 @@ use rand_chacha::{
 };
 use rayon::prelude::*;
 
-/// Displacements are never trusted to better than this.
-const LEAST_NOISE_M: f64 = 1e-3;
+/// Correlations with chips spread by this at least, metres.
+const LEAST_SPREAD_M: f64 = 1e-3;
 
 /// What a demodulator found out about the channel bits: those that the code makes of the message.
 #[derive(Debug, Clone)]
@@ -206,7 +206,7 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     let explained: f64 = estimate.iter().zip(&sums.scores).map(|(b, q)| b * q).sum();
     let explained = explained * job.parameters.amplitude_m * ratio(sums.trace, count);
     let spread2 =
-        ((dot(&sums.correlations, &sums.correlations) - explained) / count).max(LEAST_NOISE_M.powi(2));
+        ((dot(&sums.correlations, &sums.correlations) - explained) / count).max(LEAST_SPREAD_M.powi(2));
     let chips_of_bit = count / job.bits as f64;
     let variance = |j: usize| if gain(j) > 0.0 { spread2 * chips_of_bit / gain(j).powi(2) } else { 1.0 };
     Demodulation {

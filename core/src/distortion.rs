@@ -20,7 +20,7 @@ pub struct Spread {
 
 impl Spread {
     /// Of these values, none of them NaN.
-    pub fn of(mut values: Vec<f64>) -> Self {
+    pub fn summarise(mut values: Vec<f64>) -> Self {
         values.par_sort_unstable_by(f64::total_cmp);
         let count = values.len().max(1) as f64;
         // The sum of nothing would be -0.
@@ -102,7 +102,7 @@ impl Displacement {
             let [dx, dy] = measure.metres_between(*from, *to);
             dx.hypot(dy)
         };
-        let spread = Spread::of(vertices.coords().iter().zip(moved).map(metres).collect());
+        let spread = Spread::summarise(vertices.coords().iter().zip(moved).map(metres).collect());
         Displacement { rms_m: spread.root_mean_square, p99_m: spread.p99, max_m: spread.max }
     }
 }
@@ -129,7 +129,7 @@ impl AngleChange {
         let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
         let right: Vec<&Corner> = corners.iter().filter(|corner| is_right(corner.before_deg)).collect();
         let kept = right.iter().filter(|corner| corner.change_deg() <= RIGHT_DEG).count();
-        let spread = Spread::of(corners.iter().map(Corner::change_deg).collect());
+        let spread = Spread::summarise(corners.iter().map(Corner::change_deg).collect());
         AngleChange {
             count: corners.len(),
             mean_change_deg: spread.mean,
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn of_nothing_all_is_zero_without_a_sign() {
-        let Spread { mean, root_mean_square, p99, max } = Spread::of(Vec::new());
+        let Spread { mean, root_mean_square, p99, max } = Spread::summarise(Vec::new());
         assert_eq!([mean, root_mean_square, p99, max].map(f64::to_bits), [0; 4]);
     }
 

@@ -3,14 +3,14 @@
 use crate::{
     Error, Result,
     carrier::{Carrier, bit_of_coefficient},
-    deformation::{Deformation, Prediction},
+    deformation::{Deformation, LEAST_NOISE_M, Prediction},
     demodulation::joint_solved,
     distortion::{AngleChange, Corner, Displacement},
     key::SecretKey,
     map::Map,
     message::Message,
     nearness::VertexTree,
-    options::{Parameters, Shape},
+    options::{Parameters, Rigidity},
     patches::{Patch, Patches},
     placement::Placement,
     response::Response,
@@ -66,9 +66,6 @@ pub struct Embedding<'a> {
     carriers: usize,
     parameters: &'a Parameters,
 }
-
-/// A displacement is read back as if with this noise at least, metres.
-const LEAST_NOISE_M: f64 = 0.01;
 
 impl<'a> Embedding<'a> {
     /// Meshes the map and cuts it into patches, for messages of so many bits.
@@ -152,8 +149,8 @@ impl<'a> Embedding<'a> {
     ) -> Result<Vec<Vec<[f64; 2]>>> {
         let basis = Basis::known_or_solved(&self.bases, number, patch, self.carriers + 1)?;
         let gain = match self.parameters.shape {
-            Shape::Free => 1.0,
-            Shape::Rigid => {
+            Rigidity::Free => 1.0,
+            Rigidity::Rigid => {
                 let carriers = basis.vectors.subcols(1, self.carriers);
                 Response::new(patch, carriers.to_owned()).gain(patch, carriers.to_owned())
             }
@@ -202,7 +199,9 @@ impl<'a> Embedding<'a> {
         std::iter::once(0.0).chain(modulated).collect()
     }
 
-    /// Reads the message back as the verifier does, from as many patches as it takes.
+    /// Reads the message back as the verifier does by default, from as many patches as it takes: by the joint
+    /// demodulator, as the noise of the grid and of the constraints is known here. The driver reads a written file back
+    /// by [`crate::demodulation::paper`], which needs no estimate of the noise that the digits of a format add.
     fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
         let from = self.map.vertices.coords().iter();
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));

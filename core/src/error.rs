@@ -1,8 +1,6 @@
 use crate::{
-    code::Code,
     counted,
-    key::RECIPIENT_BITS,
-    options::{Kind, OPTIONS, PATCH_SIZE_RANGE, Spelling},
+    options::{Code, Kind, OPTIONS, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling},
 };
 use std::fmt;
 

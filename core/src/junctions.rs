@@ -48,7 +48,7 @@ impl Junctions {
     }
 
     /// What a vertex hangs on, if it does.
-    pub fn of(&self, vertex: u32) -> Option<&Hanging> {
+    pub fn hanging_at(&self, vertex: u32) -> Option<&Hanging> {
         self.hanging.binary_search_by_key(&vertex, |h| h.vertex).ok().map(|i| &self.hanging[i])
     }
 

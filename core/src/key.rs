@@ -1,19 +1,35 @@
 //! The secret key k_w and what is derived from it.
 
-use crate::{
-    Error, Result,
-    message::{Message, to_hex},
-    whitening::unwhiten,
-};
+pub use crate::options::RECIPIENT_BITS;
+
+use crate::{Error, Result, hex, message::Message};
 use hmac::{Hmac, KeyInit, Mac};
 use serde::{Deserialize, Serialize};
 use sha2::Sha256;
+use std::io::{self, Read};
 use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
 
-/// How long the message of a recipient is.
-pub const RECIPIENT_BITS: usize = 128;
-
 const VERSION: u32 = 1;
+
+/// A key file has 150 bytes, and few records have a thousand times as many; a mistaken /dev/zero has no end.
+const LONGEST_TEXT: u64 = 1 << 20;
+/// So much is reserved for a text, that no copies of a secret are left where it would have to grow.
+const USUAL_TEXT: usize = 1024;
+
+/// The text of a key file or a record.
+///
+/// # Errors
+/// Those of `source`, bytes that are not UTF-8, more than 1 MiB.
+pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
+    let mut text = Zeroizing::new(String::with_capacity(USUAL_TEXT));
+    source.take(LONGEST_TEXT + 1).read_to_string(&mut text)?;
+    match text.len() as u64 {
+        0..=LONGEST_TEXT => Ok(text),
+        _ => {
+            Err(io::Error::other(format!("it is longer than the {LONGEST_TEXT} bytes of any key or record")))
+        }
+    }
+}
 
 /// A 256-bit secret. It never prints itself and is wiped from memory when dropped.
 #[derive(Clone, Zeroize, ZeroizeOnDrop)]
@@ -49,16 +65,9 @@ impl SecretKey {
         if file.meshmark_key != VERSION {
             return Err(malformed(&format!("version {} instead of {VERSION}", file.meshmark_key)));
         }
-        let digits = file.secret.as_bytes();
-        let hex = |i: usize| digits.get(i).and_then(|d| (*d as char).to_digit(16));
-        let byte = |i: usize| Some((hex(2 * i)? << 4 | hex(2 * i + 1)?) as u8);
         let mut secret = Zeroizing::new([0; 32]);
-        for (i, out) in secret.iter_mut().enumerate() {
-            *out = byte(i).ok_or_else(|| malformed("the secret is not 64 hexadecimal digits"))?;
-        }
-        if digits.len() != 64 {
-            return Err(malformed("the secret is not 64 hexadecimal digits"));
-        }
+        hex::decode_into(&file.secret, secret.as_mut_slice())
+            .ok_or_else(|| malformed("the secret is not 64 hexadecimal digits"))?;
         let key = SecretKey(*secret);
         if key.id() != file.id {
             return Err(malformed("the id is not that of the secret, so one of them was changed"));
@@ -68,23 +77,18 @@ impl SecretKey {
 
     /// The text of a key file.
     pub fn to_json(&self) -> Zeroizing<String> {
-        let file = KeyFile { meshmark_key: VERSION, id: self.id(), secret: to_hex(&self.0) };
+        let file = KeyFile { meshmark_key: VERSION, id: self.id(), secret: hex::encode(&self.0) };
         Zeroizing::new(serde_json::to_string_pretty(&file).expect("strings are JSON") + "\n")
     }
 
     /// The public name of the key: 64 bits of a keyed hash, in hexadecimal.
     pub fn id(&self) -> String {
-        to_hex(&self.derive("key id", b"")[..8])
+        hex::encode(&self.derive("key id", b"")[..8])
     }
 
     /// The message of a recipient: [`RECIPIENT_BITS`] of a keyed hash of the text.
     pub fn recipient_message(&self, recipient: &str) -> Message {
         Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..RECIPIENT_BITS / 8])
-    }
-
-    /// The message that this key whitens to these bits.
-    pub fn unwhitened(&self, carried: &Message) -> Message {
-        unwhiten(self, carried)
     }
 
     /// As many key-dependent bits as `half` has, for a round of the whitening of messages of so many bits.
@@ -146,6 +150,16 @@ mod tests {
         ] {
             let error = SecretKey::from_json(&bad).unwrap_err().to_string();
             assert!(error.contains("malformed key") && !error.contains("abab"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_text_is_read_to_its_end_or_refused() {
+        let text = "ä".repeat(1 << 19);
+        assert_eq!(*read_text(text.as_bytes()).unwrap(), text);
+        for (endless, reason) in [(b' ', "longer than the 1048576 bytes"), (0xff, "UTF-8")] {
+            let error = read_text(io::repeat(endless)).unwrap_err().to_string();
+            assert!(error.contains(reason), "{error}");
         }
     }
 

@@ -14,8 +14,9 @@ pub struct Map<'a> {
     /// The segments of rings and lines: canonical indices [a, b] with a < b, sorted, each pair once. Points
     /// have none.
     pub segments: &'a [[u32; 2]],
-    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
-    pub polygons: &'a [u32],
+    /// Of every vertex the first vertex of its polygon group, the polygons that shared vertices join; itself when it is in
+    /// none.
+    pub polygon_roots: &'a [u32],
     /// Metres on the ground, as the mark has them.
     pub ground: Ground,
     /// Metres on the ground where a vertex is, when they are others.
@@ -25,7 +26,7 @@ pub struct Map<'a> {
 impl<'a> Map<'a> {
     /// A map of points alone.
     pub fn of_points(vertices: &'a VertexTable, ground: Ground) -> Self {
-        Map { vertices, segments: &[], polygons: &[], ground, lattice: None }
+        Map { vertices, segments: &[], polygon_roots: &[], ground, lattice: None }
     }
 
     /// Metres where a vertex is.

@@ -12,8 +12,9 @@ pub struct MapData {
     pub vertices: VertexTable,
     /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
     pub segments: Vec<[u32; 2]>,
-    /// Of every vertex the first one of the polygons that shared vertices join it to; itself when it is in none.
-    pub polygons: Vec<u32>,
+    /// Of every vertex the first vertex of its polygon group, the polygons that shared vertices join; itself when it is in
+    /// none.
+    pub polygon_roots: Vec<u32>,
     /// Attribute texts and their places.
     pub labels: Vec<Label>,
     /// Rings and lines that have a form of their own.
@@ -80,15 +81,15 @@ impl MapData {
     ) -> Result<(Self, Vec<u32>)> {
         let (vertices, indices) = VertexTable::indexed(coords)?;
         let segments = segments(&indices, starts);
-        let polygons = polygons(&indices, starts, kinds, vertices.len());
+        let polygon_roots = polygon_roots(&indices, starts, kinds, vertices.len());
         let (labels, polylines) = (Vec::new(), Vec::new());
-        Ok((MapData { vertices, segments, polygons, labels, polylines }, indices))
+        Ok((MapData { vertices, segments, polygon_roots, labels, polylines }, indices))
     }
 
     /// A map of points alone.
     pub fn of_points(vertices: VertexTable) -> Self {
-        let polygons = (0..vertices.len() as u32).collect();
-        MapData { vertices, segments: Vec::new(), polygons, labels: Vec::new(), polylines: Vec::new() }
+        let polygon_roots = (0..vertices.len() as u32).collect();
+        MapData { vertices, segments: Vec::new(), polygon_roots, labels: Vec::new(), polylines: Vec::new() }
     }
 
     /// The same map with all its coordinates taken elsewhere, for example into another CRS, by `place`. Vertices that fall
@@ -104,20 +105,23 @@ impl MapData {
         let moved = self.segments.iter().map(|segment| segment.map(|v| indices[v as usize]));
         let segments = distinct(moved);
         let mut joined = DisjointSets::new(vertices.len());
-        indices.iter().zip(&self.polygons).for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
+        indices
+            .iter()
+            .zip(&self.polygon_roots)
+            .for_each(|(&v, &first)| joined.join(v, indices[first as usize]));
         let (mut labels, mut polylines) = (self.labels.clone(), self.polylines.clone());
         let of_labels = place(labels.iter().map(|label| label.point).collect())?;
         labels.iter_mut().zip(of_labels).for_each(|(label, point)| label.point = point);
         let of_polylines = polylines.iter().flat_map(|polyline| polyline.vertices.iter().copied()).collect();
         let in_polylines = polylines.iter_mut().flat_map(|polyline| &mut polyline.vertices);
         in_polylines.zip(place(of_polylines)?).for_each(|(vertex, point)| *vertex = point);
-        Ok(MapData { vertices, segments, polygons: joined.roots(), labels, polylines })
+        Ok(MapData { vertices, segments, polygon_roots: joined.roots(), labels, polylines })
     }
 
     /// The map as the algorithm sees it.
     pub fn on<'a>(&'a self, ground: Ground, lattice: Option<&'a ScaleLattice>) -> Map<'a> {
-        let MapData { vertices, segments, polygons, .. } = self;
-        Map { vertices, segments, polygons, ground, lattice }
+        let MapData { vertices, segments, polygon_roots, .. } = self;
+        Map { vertices, segments, polygon_roots, ground, lattice }
     }
 }
 
@@ -142,7 +146,7 @@ fn distinct(segments: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
 }
 
 /// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
-fn polygons(
+fn polygon_roots(
     indices: &[u32],
     starts: &[u32],
     kinds: impl IntoIterator<Item = ChainKind>,
@@ -179,7 +183,10 @@ mod tests {
         // A polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to 8, a polygon 9 10 11.
         let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
         let kinds = [Shell, Hole, Shell, Line, Shell];
-        assert_eq!(polygons(&indices, &[0, 4, 8, 12, 14], kinds, 12), [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]);
+        assert_eq!(
+            polygon_roots(&indices, &[0, 4, 8, 12, 14], kinds, 12),
+            [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]
+        );
     }
 
     #[test]
@@ -187,6 +194,6 @@ mod tests {
         let square = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
         let (map, _) = MapData::from_chains(square, &[0], [ChainKind::Shell]).unwrap();
         let flat = map.moved::<Error>(|places| Ok(places.iter().map(|p| [p[0], 0.0]).collect())).unwrap();
-        assert_eq!((flat.vertices.len(), flat.segments, flat.polygons), (2, vec![[0, 1]], vec![0, 0]));
+        assert_eq!((flat.vertices.len(), flat.segments, flat.polygon_roots), (2, vec![[0, 1]], vec![0, 0]));
     }
 }

@@ -1,8 +1,7 @@
 //! The Delaunay mesh that joins all vertices of a map (paper, section 3.1).
 
-use crate::{Error, Result};
-use robust::{Coord, orient2d};
-use spade::{DelaunayTriangulation, Point2, Triangulation};
+use crate::{Error, Result, orientation::orientation};
+use spade::{DelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
 use std::collections::HashMap;
 
 /// The edges of a Delaunay triangulation.
@@ -13,7 +12,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Triangulates `points` (distinct, relative to a local origin).
+    /// Triangulates `points` (distinct, relative to a local origin). Magnitudes under 2⁻¹⁴², which spade
+    /// refuses, count as zero.
     ///
     /// # Errors
     /// [`Error::Collinear`] when no triangle exists.
@@ -22,24 +22,24 @@ impl Mesh {
     /// When a coordinate is not finite or there are 2³² points; [`crate::vertices::VertexTable`]
     /// lets neither through.
     pub fn delaunay(points: &[[f64; 2]]) -> Result<Self> {
-        if all_collinear(points) {
+        let points: Vec<_> = points.iter().map(|&[x, y]| mitigate_underflow(Point2::new(x, y))).collect();
+        if all_collinear(&points) {
             return Err(Error::Collinear { vertices: points.len() });
         }
-        let elements = points.iter().map(|&[x, y]| Point2::new(drop_tiny(x), drop_tiny(y)));
         let triangulation: DelaunayTriangulation<Point2<f64>> =
-            DelaunayTriangulation::bulk_load_stable(elements.collect())
+            DelaunayTriangulation::bulk_load_stable(points.clone())
                 .expect("coordinates are finite, not tiny and below 1e30");
-        let number = Numbering::new(points, &triangulation);
+        let numbering = Numbering::new(&points, &triangulation);
         let mut edges: Vec<[u32; 2]> = triangulation
             .undirected_edges()
             .map(|edge| {
-                let [a, b] = edge.vertices().map(|v| number.of(v.fix().index(), v.position()));
+                let [a, b] = edge.vertices().map(|v| numbering.vertex(v.fix().index(), v.position()));
                 [a.min(b), a.max(b)]
             })
             .collect();
         edges.sort_unstable();
         let corners = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, _, _, _, _>| {
-            face.vertices().map(|v| number.of(v.fix().index(), v.position()))
+            face.vertices().map(|v| numbering.vertex(v.fix().index(), v.position()))
         };
         let triangles = triangulation.inner_faces().map(corners).collect();
         Ok(Mesh { edges, triangles })
@@ -56,11 +56,6 @@ impl Mesh {
     }
 }
 
-/// spade refuses magnitudes under 1e-142; relative to the extent of any map they are zero.
-fn drop_tiny(value: f64) -> f64 {
-    if value.abs() < 1e-140 { 0.0 } else { value }
-}
-
 /// From the triangulation's vertices to our numbers. They are the same unless two distinct vertices
 /// became one when the local origin was subtracted; then the mesh holds the first of them, and the
 /// other one is joined to its patch by the bridging rule of [`crate::patches`].
@@ -70,35 +65,35 @@ enum Numbering {
 }
 
 impl Numbering {
-    fn new(points: &[[f64; 2]], triangulation: &DelaunayTriangulation<Point2<f64>>) -> Self {
+    fn new(points: &[Point2<f64>], triangulation: &DelaunayTriangulation<Point2<f64>>) -> Self {
         if triangulation.num_vertices() == points.len() {
             return Numbering::Same;
         }
         let mut first = HashMap::new();
-        for (i, &[x, y]) in points.iter().enumerate() {
-            first.entry(bits(drop_tiny(x), drop_tiny(y))).or_insert(i as u32);
+        for (i, &point) in points.iter().enumerate() {
+            first.entry(bits(point)).or_insert(i as u32);
         }
         Numbering::ByPosition(first)
     }
 
-    fn of(&self, index: usize, position: Point2<f64>) -> u32 {
+    fn vertex(&self, index: usize, position: Point2<f64>) -> u32 {
         match self {
             Numbering::Same => index as u32,
-            Numbering::ByPosition(first) => first[&bits(position.x, position.y)],
+            Numbering::ByPosition(first) => first[&bits(position)],
         }
     }
 }
 
-fn bits(x: f64, y: f64) -> [u64; 2] {
+fn bits(Point2 { x, y }: Point2<f64>) -> [u64; 2] {
     [(x + 0.0).to_bits(), (y + 0.0).to_bits()]
 }
 
 /// Whether no three points span a triangle, by an exact predicate. The first and the last point
 /// in canonical order are the ends of the line, if there is one.
-fn all_collinear(points: &[[f64; 2]]) -> bool {
-    let coord = |p: &[f64; 2]| Coord { x: p[0], y: p[1] };
+fn all_collinear(points: &[Point2<f64>]) -> bool {
+    let place = |p: &Point2<f64>| [p.x, p.y];
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return true };
-    points.iter().all(|p| orient2d(coord(first), coord(last), coord(p)) == 0.0)
+    points.iter().all(|p| orientation(place(first), place(last), place(p)) == 0.0)
 }
 
 #[cfg(test)]
@@ -119,6 +114,23 @@ mod tests {
         let line: Vec<_> = (0..20_000).map(|i| [i as f64, 2.0 * i as f64]).collect();
         assert_eq!(Mesh::delaunay(&line), Err(Error::Collinear { vertices: 20_000 }));
         assert_eq!(Mesh::delaunay(&[[1.0, 1.0]]), Err(Error::Collinear { vertices: 1 }));
+    }
+
+    #[test]
+    fn magnitudes_that_spade_refuses_are_zero() {
+        let square = |centre| [[-1.0, -1.0], [-1.0, 1.0], centre, [1.0, -1.0], [1.0, 1.0]];
+        let expected = Mesh::delaunay(&square([0.0, 0.0])).unwrap();
+        for tiny in [f64::MIN_POSITIVE, 1e-200, 1e-141, 1e-139, 1e-100, 1e-43] {
+            for centre in [[tiny, 0.0], [0.0, -tiny], [-tiny, tiny]] {
+                assert_eq!(Mesh::delaunay(&square(centre)).unwrap(), expected, "{centre:?}");
+            }
+            let strip = [[-tiny, 0.0], [0.0, 1.0], [tiny, 0.5]];
+            assert_eq!(Mesh::delaunay(&strip), Err(Error::Collinear { vertices: 3 }), "{tiny}");
+        }
+        for small in [1e-42, 1e-20] {
+            let strip = [[-small, 0.0], [0.0, 1.0], [small, 0.5]];
+            assert_eq!(Mesh::delaunay(&strip).unwrap().triangles().len(), 1, "{small}");
+        }
     }
 
     #[test]

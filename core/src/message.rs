@@ -81,11 +81,6 @@ impl Message {
     }
 }
 
-/// Bytes as lower-case hexadecimal digits.
-pub(crate) fn to_hex(bytes: &[u8]) -> String {
-    Message::from_bytes(bytes).to_hex()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -27,7 +27,7 @@ pub struct NoiseLaw {
 
 impl NoiseLaw {
     /// The law under which `residuals_m` (any number, metres, of one axis each) tell most about a shift.
-    pub fn of(residuals_m: &[f64]) -> Self {
+    pub fn fit(residuals_m: &[f64]) -> Self {
         let plain = Self::with_exponent(2.0, residuals_m);
         if residuals_m.len() < LEAST_RESIDUALS {
             return plain;
@@ -76,11 +76,11 @@ mod tests {
 
     #[test]
     fn gaussian_and_heavy_tailed_noise_stay_with_least_squares() {
-        let normal = NoiseLaw::of(&noise(|u| 0.3 * gaussian(u)));
+        let normal = NoiseLaw::fit(&noise(|u| 0.3 * gaussian(u)));
         assert_eq!(normal.exponent, 2.0);
         assert!((normal.variance_m2 - 0.09).abs() < 0.004, "{normal:?}");
         assert_eq!(normal.apply(0.7), 0.7);
-        let laplace = NoiseLaw::of(&noise(|u| -(1.0 - u()).ln() * if u() < 0.5 { 1.0 } else { -1.0 }));
+        let laplace = NoiseLaw::fit(&noise(|u| -(1.0 - u()).ln() * if u() < 0.5 { 1.0 } else { -1.0 }));
         assert_eq!(laplace.exponent, 2.0);
     }
 
@@ -89,7 +89,7 @@ mod tests {
         // Uniform ±0.5 m with a Gaussian mark of 7 cm under it, all shifted by a centimetre.
         let mark = noise(|u| 0.07 * gaussian(u));
         let plain: Vec<f64> = noise(|u| u() - 0.5).iter().rev().zip(mark).map(|(n, m)| n + m).collect();
-        let law = NoiseLaw::of(&plain);
+        let law = NoiseLaw::fit(&plain);
         assert!(law.exponent > 2.0 && law.variance_m2 < 0.6 * (1.0 / 12.0 + 0.07 * 0.07), "{law:?}");
         let mean = |shift: f64| plain.iter().map(|r| law.apply(r + shift)).sum::<f64>() / 2e4;
         assert!((mean(0.01) - mean(-0.01) - 0.02).abs() < 0.002, "{}", mean(0.01) - mean(-0.01));
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn no_residuals_and_no_noise_are_no_trouble() {
-        assert_eq!(NoiseLaw::of(&[]).apply(0.2), 0.2);
-        assert_eq!(NoiseLaw::of(&[0.0; 1000]).apply(0.2), 0.2);
+        assert_eq!(NoiseLaw::fit(&[]).apply(0.2), 0.2);
+        assert_eq!(NoiseLaw::fit(&[0.0; 1000]).apply(0.2), 0.2);
     }
 }

@@ -194,8 +194,9 @@ fn split_set(
     let axis = longer_side(points, set);
     let left_parts = parts / 2;
     let left = (set.len() as u64 * left_parts as u64 / parts as u64) as usize;
-    let first =
-        |v: u32| constraints.bodies.of(v).map_or(v, |body| constraints.bodies.as_slice()[body].members[0]);
+    let first = |v: u32| {
+        constraints.bodies.number_at(v).map_or(v, |body| constraints.bodies.as_slice()[body].members[0])
+    };
     // Ties are broken by the canonical index, so the cut is the same on any machine.
     let order = |a: &u32, b: &u32| {
         let (p, q) = (first(*a), first(*b));

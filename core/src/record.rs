@@ -5,7 +5,7 @@ use crate::{
     code::Code,
     distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
     message::Message,
-    options::{Laplacian, Parameters, Shape, Subject},
+    options::{Laplacian, Parameters, Rigidity, Subject},
 };
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +41,7 @@ pub struct Record {
     /// No vertex moved further.
     pub tolerance_m: f64,
     /// What moved as one.
-    pub shape: Shape,
+    pub shape: Rigidity,
     /// Which functions carry the mark.
     pub basis: Laplacian,
     /// Output grid in CRS units.

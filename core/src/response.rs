@@ -1,6 +1,6 @@
 //! How the vertices of a patch respond to its coefficients, constraints included.
 
-use crate::{options::Shape, patches::Patch, spectrum::Basis};
+use crate::{options::Rigidity, patches::Patch, spectrum::Basis};
 use faer::{
     Accum, Mat, Par, Scale,
     linalg::matmul::triangular::{self, BlockStructure},
@@ -35,11 +35,11 @@ impl Kernel {
 impl Response {
     /// The response to the coefficients that carry the mark, all but the mean. With SHAPE=rigid it is amplified:
     /// then the mark is expected to move vertices as far, root mean square, as it moves free ones.
-    pub fn carriers(patch: &Patch, basis: &Basis, shape: Shape) -> Self {
+    pub fn carriers(patch: &Patch, basis: &Basis, shape: Rigidity) -> Self {
         let carriers = basis.vectors.ncols() - 1;
         let basis = basis.vectors.subcols(1, carriers);
         let mut response = Self::new(patch, basis.to_owned());
-        if shape == Shape::Rigid {
+        if shape == Rigidity::Rigid {
             let gain = response.gain(patch, basis.to_owned());
             response.blocks_mut().iter_mut().for_each(|block| *block *= Scale(gain));
         }

@@ -62,14 +62,14 @@ impl ScaleLattice {
         negligible: f64,
         scales_at: impl Fn(&[[f64; 2]]) -> Vec<Option<Scale>>,
     ) -> Option<Self> {
-        let lattice = |nodes_per_side| Self::of(vertices.bounds(), nodes_per_side, &scales_at);
+        let lattice = |nodes_per_side| Self::sample(vertices.bounds(), nodes_per_side, &scales_at);
         let is_even =
             |scale: &Option<Scale>| scale.is_some_and(|scale| scale.off(metres_per_unit) < negligible);
         let needs_none = vertices.is_empty() || lattice(COARSE).nodes.iter().all(is_even);
         (!needs_none).then(|| lattice(FINE))
     }
 
-    fn of(
+    fn sample(
         (lower, upper): ([f64; 2], [f64; 2]),
         nodes_per_side: usize,
         scales_at: &impl Fn(&[[f64; 2]]) -> Vec<Option<Scale>>,

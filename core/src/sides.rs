@@ -3,8 +3,7 @@
 //! It follows the place where it touches, and rounding puts it on either side. Where its own segments all lead away on
 //! one side, the other one is through the wall: then it goes back by units in the last place.
 
-use crate::{map::Map, placement::Placement};
-use robust::{Coord, orient2d};
+use crate::{map::Map, orientation::orientation, placement::Placement};
 
 /// Contacts depend on each other through shared vertices; more rounds than a chain of them needs.
 const MOST_ROUNDS: usize = 16;
@@ -91,11 +90,8 @@ fn contacts(map: &Map, touching: &[Touching]) -> Vec<Contact> {
     touching.iter().filter_map(contact).collect()
 }
 
-/// Positive where the vertex is on the left of the segment; the sign is exact.
+/// The orientation of a vertex to a segment.
 fn side(coords: &[[f64; 2]], vertex: u32, segment: [u32; 2]) -> f64 {
-    let [a, b, p] = [segment[0], segment[1], vertex].map(|v| {
-        let [x, y] = coords[v as usize];
-        Coord { x, y }
-    });
-    orient2d(a, b, p)
+    let [a, b, p] = [segment[0], segment[1], vertex].map(|v| coords[v as usize]);
+    orientation(a, b, p)
 }

@@ -117,7 +117,7 @@ impl<'a> Movement<'a> {
     }
 
     fn body(&self, vertex: u32) -> Option<&'a Body> {
-        self.constraints.bodies.of(vertex).map(|body| &self.constraints.bodies.as_slice()[body])
+        self.constraints.bodies.number_at(vertex).map(|body| &self.constraints.bodies.as_slice()[body])
     }
 
     /// How a free vertex or a body should move.
@@ -213,7 +213,7 @@ impl<'a> Movement<'a> {
     /// The free vertices and bodies whose displacements make a hit.
     fn movers(&self, hit: &Hit) -> Vec<u32> {
         let mover = |vertex: u32| self.body(vertex).map_or(vertex, |body| body.members[0]);
-        let of = |vertex: &u32| match self.constraints.junctions.of(*vertex) {
+        let of = |vertex: &u32| match self.constraints.junctions.hanging_at(*vertex) {
             Some(hanging) => hanging.anchors.iter().map(|(anchor, _)| mover(*anchor)).collect(),
             None => vec![mover(*vertex)],
         };

@@ -1,6 +1,6 @@
 //! The vertices of a map in canonical order: the one numbering that embedding and detection share.
 
-use crate::{Error, Result};
+use crate::{Error, Result, hex};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
@@ -101,7 +101,7 @@ impl VertexTable {
             hash.update(x.to_le_bytes());
             hash.update(y.to_le_bytes());
         }
-        crate::message::to_hex(&hash.finalize())
+        hex::encode(&hash.finalize())
     }
 }
 

@@ -15,9 +15,11 @@ pub(crate) fn whiten(key: &SecretKey, message: &Message) -> Message {
     permute(key, message, 0..ROUNDS)
 }
 
-/// The message that these bits carry.
-pub(crate) fn unwhiten(key: &SecretKey, carried: &Message) -> Message {
-    permute(key, carried, (0..ROUNDS).rev())
+impl SecretKey {
+    /// The message that this key whitens to these bits.
+    pub fn unwhitened(&self, carried: &Message) -> Message {
+        permute(self, carried, (0..ROUNDS).rev())
+    }
 }
 
 /// Every round adds to one half what the key makes of the other one: even rounds to the first half, odd ones to the
@@ -53,7 +55,7 @@ mod tests {
             let (key, message) = (key(byte), message(&hex));
             let carried = whiten(&key, &message);
             prop_assert_eq!(carried.len(), message.len());
-            prop_assert_eq!(unwhiten(&key, &carried), message);
+            prop_assert_eq!(key.unwhitened(&carried), message);
         }
     }
 

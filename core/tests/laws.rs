@@ -227,7 +227,7 @@ fn output_is_bit_equal_for_any_number_of_threads() {
 fn messages_marked_together_are_those_marked_alone() {
     let table = grid(40);
     let map = Map::of_points(&table, METRES);
-    for parameters in [small(), Parameters { shape: meshmark_core::options::Shape::Rigid, ..small() }] {
+    for parameters in [small(), Parameters { shape: meshmark_core::options::Rigidity::Rigid, ..small() }] {
         let messages =
             [MESSAGE, "fedcba9876543210", "00ff00ff00ff00ff"].map(|h| Message::from_hex(h).unwrap());
         let embedding = Embedding::new(&map, &key(), 64, &parameters).unwrap().for_many().unwrap();

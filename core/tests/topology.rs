@@ -7,7 +7,8 @@ use meshmark_core::{
     key::SecretKey,
     map::Map,
     message::Message,
-    options::{Laplacian, Parameters, Shape},
+    options::{Laplacian, Parameters, Rigidity},
+    orientation::orientation,
     patches::Patches,
     vertices::VertexTable,
 };
@@ -28,7 +29,7 @@ struct Sketch {
 struct Town {
     vertices: VertexTable,
     segments: Vec<[u32; 2]>,
-    polygons: Vec<u32>,
+    polygon_roots: Vec<u32>,
 }
 
 impl Town {
@@ -38,8 +39,8 @@ impl Town {
     }
 
     fn map(&self) -> Map<'_> {
-        let Town { vertices, segments, polygons } = self;
-        Map { segments, polygons, ..Map::of_points(vertices, METRES) }
+        let Town { vertices, segments, polygon_roots } = self;
+        Map { segments, polygon_roots, ..Map::of_points(vertices, METRES) }
     }
 
     fn coords(&self) -> &[[f64; 2]] {
@@ -70,13 +71,13 @@ impl Sketch {
         segments.sort_unstable();
         segments.dedup();
         // Along a ring, labels go round in one direction or the other: two passes reach every corner.
-        let mut polygons: Vec<u32> = (0..table.len() as u32).collect();
+        let mut polygon_roots: Vec<u32> = (0..table.len() as u32).collect();
         let there: Vec<[u32; 2]> = self.sides.iter().map(pair).collect();
         for [a, b] in there.iter().chain(there.iter().rev()).chain(&there) {
-            let first = polygons[*a as usize].min(polygons[*b as usize]);
-            (polygons[*a as usize], polygons[*b as usize]) = (first, first);
+            let first = polygon_roots[*a as usize].min(polygon_roots[*b as usize]);
+            (polygon_roots[*a as usize], polygon_roots[*b as usize]) = (first, first);
         }
-        Town { vertices: table, segments, polygons }
+        Town { vertices: table, segments, polygon_roots }
     }
 }
 
@@ -124,8 +125,8 @@ fn small_town() -> Sketch {
     town(&(0..30).map(block).collect::<Vec<_>>())
 }
 
-fn shapes() -> impl Strategy<Value = Shape> {
-    prop_oneof![Just(Shape::Free), Just(Shape::Rigid)]
+fn shapes() -> impl Strategy<Value = Rigidity> {
+    prop_oneof![Just(Rigidity::Free), Just(Rigidity::Rigid)]
 }
 
 fn laplacians() -> impl Strategy<Value = Laplacian> {
@@ -208,11 +209,11 @@ proptest! {
 #[test]
 fn rigid_houses_keep_their_shape_and_move_as_far_as_free_ones() {
     let town = small_town().survey();
-    let rigid = Parameters { shape: Shape::Rigid, ..parameters() };
+    let rigid = Parameters { shape: Rigidity::Rigid, ..parameters() };
     let marked = town.mark(&rigid);
     // Sides and diagonals of every house: all distances between vertices of one polygon.
     for i in 0..town.coords().len() {
-        for j in (0..i).filter(|&j| town.polygons[i] == town.polygons[j]) {
+        for j in (0..i).filter(|&j| town.polygon_roots[i] == town.polygon_roots[j]) {
             let before = length(town.coords()[i], town.coords()[j]);
             let after = length(marked.coords[i], marked.coords[j]);
             assert!((after - before).abs() < 1e-6 * before, "{before} became {after}");
@@ -227,14 +228,14 @@ fn rigid_houses_keep_their_shape_and_move_as_far_as_free_ones() {
 #[test]
 fn a_house_is_never_cut_by_the_border_of_a_patch() {
     let town = small_town().survey();
-    let patches = Patches::new(&town.map(), &Parameters { shape: Shape::Rigid, ..parameters() }).unwrap();
+    let patches = Patches::new(&town.map(), &Parameters { shape: Rigidity::Rigid, ..parameters() }).unwrap();
     patches.validate().unwrap();
     assert!(patches.as_slice().len() > 4);
     let mut patch_of = vec![0; town.coords().len()];
     for (number, patch) in patches.as_slice().iter().enumerate() {
         patch.vertices.iter().for_each(|&v| patch_of[v as usize] = number);
     }
-    for (v, &first) in town.polygons.iter().enumerate() {
+    for (v, &first) in town.polygon_roots.iter().enumerate() {
         assert_eq!(patch_of[v], patch_of[first as usize]);
     }
     let smallest = patches.as_slice().iter().map(|patch| patch.vertices.len()).min().unwrap();
@@ -285,11 +286,8 @@ fn a_hole_that_touches_the_wall_stays_inside_to_the_last_bit() {
         contacts.push([shell[3], shell[0], hole[0]]); // with the square on the left of the first two
     }
     let town = sketch.survey();
-    let side = |contact: [[f64; 2]; 3]| {
-        let [a, b, p] = contact.map(|[x, y]| robust::Coord { x, y });
-        robust::orient2d(a, b, p)
-    };
-    for shape in [Shape::Free, Shape::Rigid] {
+    let side = |[a, b, p]: [[f64; 2]; 3]| orientation(a, b, p);
+    for shape in [Rigidity::Free, Rigidity::Rigid] {
         let marked = town.mark(&Parameters { shape, ..parameters() });
         for contact in &contacts {
             let moved = contact.map(|vertex| marked.coords[town.vertices.index_of(vertex).unwrap()]);
@@ -313,5 +311,5 @@ fn where_nothing_is_rigid_rigid_shapes_are_free_ones() {
     }
     let town = sketch.survey();
     let marked = |shape| town.mark(&Parameters { shape, ..parameters() });
-    assert_eq!(marked(Shape::Rigid).coords, marked(Shape::Free).coords);
+    assert_eq!(marked(Rigidity::Rigid).coords, marked(Rigidity::Free).coords);
 }

@@ -49,7 +49,7 @@ struct Region {
 
 impl Region {
     /// Where a map is.
-    fn of(crs: &CoordinateSystem, table: &VertexTable) -> Option<Region> {
+    fn covering(crs: &CoordinateSystem, table: &VertexTable) -> Option<Region> {
         let places: Vec<[f64; 2]> = crs.degrees(&sample(table)).into_iter().flatten().collect();
         let first = *places.first()?;
         let (min, max) = places.iter().fold((first, first), |(min, max), p| {
@@ -83,7 +83,7 @@ fn sample(table: &VertexTable) -> Vec<[f64; 2]> {
 /// Whether a good part of the map is about where the reference is; both in the CRS of the reference.
 pub fn overlaps(map: &Survey, reference: &Survey) -> bool {
     let Some(crs) = &reference.crs else { return true };
-    let Some(region) = Region::of(crs, &reference.data.vertices) else { return true };
+    let Some(region) = Region::covering(crs, &reference.data.vertices) else { return true };
     region.share(&crs.degrees(&sample(&map.data.vertices))) >= LEAST_SHARE
 }
 
@@ -95,7 +95,7 @@ pub fn likely_assumptions(
     reference: &Survey,
 ) -> Vec<Assumption> {
     let Some(crs) = &reference.crs else { return Vec::new() };
-    let Some(region) = Region::of(crs, &reference.data.vertices) else { return Vec::new() };
+    let Some(region) = Region::covering(crs, &reference.data.vertices) else { return Vec::new() };
     let numbers = sample(&raw.data.vertices);
     let swapped: Vec<[f64; 2]> = numbers.iter().map(|[x, y]| [*y, *x]).collect();
     let known = [Some(crs), own].into_iter().flatten().cloned();

@@ -1,6 +1,6 @@
 use crate::read_back::Difference;
 use meshmark_core::options::Spelling;
-use std::fmt;
+use std::{fmt, io, path::Path};
 
 /// What can be wrong with a dataset. Every message names the input and the remedy.
 #[derive(Debug)]
@@ -34,6 +34,11 @@ pub enum Error {
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong with a file.
+pub fn file_error(action: &'static str, path: &Path, error: io::Error) -> Error {
+    Error::File { action, path: path.display().to_string(), reason: error.to_string() }
+}
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

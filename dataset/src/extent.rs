@@ -18,7 +18,7 @@ impl Extent {
     pub(crate) const ANY: Extent = Extent(WIDEST / 2.0);
 
     /// Of maps in a CRS. A map without one is in metres.
-    pub(crate) fn of(crs: Option<&CoordinateSystem>) -> Self {
+    pub(crate) fn in_crs(crs: Option<&CoordinateSystem>) -> Self {
         let Some(srs) = crs.map(CoordinateSystem::spatial_ref) else { return Extent(FURTHEST_M) };
         Extent(match srs.is_geographic() {
             true => FURTHEST_DEGREES / srs.angular_units().to_degrees(),

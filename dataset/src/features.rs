@@ -1,6 +1,8 @@
 //! Geometries one by one, for comparing two maps feature by feature.
 
-use crate::{CoordinateSystem, Error, Outline, Result, extent::Extent, survey::chosen_layers, turns::turn};
+use crate::{
+    CoordinateSystem, Error, Outline, Result, extent::Extent, selection::chosen_layers, turns::turn,
+};
 use gdal::{Dataset, vector::LayerAccess};
 
 /// One geometry of a dataset.
@@ -31,7 +33,7 @@ pub fn features(
         let mut layer = dataset.layer(index)?;
         let srs = layer.defn().geom_fields().map(|field| field.spatial_ref().ok());
         let crs = srs.map(|srs| srs.and_then(CoordinateSystem::of_layer));
-        let extents: Vec<Extent> = crs.map(|crs| Extent::of(crs.as_ref())).collect();
+        let extents: Vec<Extent> = crs.map(|crs| Extent::in_crs(crs.as_ref())).collect();
         for feature in layer.features() {
             for (column, extent) in extents.iter().enumerate() {
                 let Ok(geometry) = feature.geometry_by_index(column) else { continue }; // a null geometry

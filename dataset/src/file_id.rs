@@ -15,7 +15,7 @@ pub struct FileId {
 
 impl FileId {
     /// The file at a path, if there is one.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn at(path: &Path) -> Option<Self> {
         fs::metadata(path).ok().map(|metadata| FileId::of_metadata(&metadata))
     }
 
@@ -27,5 +27,5 @@ impl FileId {
 
 /// Whether both paths lead to one file that exists.
 pub fn same_file(a: &Path, b: &Path) -> bool {
-    FileId::of(a).is_some_and(|id| FileId::of(b) == Some(id))
+    FileId::at(a).is_some_and(|id| FileId::at(b) == Some(id))
 }

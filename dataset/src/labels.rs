@@ -1,6 +1,6 @@
 //! Labels: attribute texts with the place they stand for, from which a verifier makes landmarks.
 
-use crate::LabelFields;
+use crate::selection::LabelFields;
 use gdal::vector::{Feature, FieldValue};
 use geo::{Centroid, Geometry, HasDimensions, dimensions::Dimensions};
 use meshmark_core::map_data::{Dimension, Label};

@@ -17,6 +17,7 @@ pub mod geojson_text;
 mod geometries;
 pub mod geopackage;
 mod labels;
+pub mod marked_view;
 pub mod marking;
 mod polylines;
 pub mod publication;
@@ -35,10 +36,6 @@ pub use error::{Error, Result};
 pub use features::{FeatureGeometry, features};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};
-/// The most vertices a map may have: their numbers are 32 bits wide.
-pub const MOST_VERTICES: usize = u32::MAX as usize;
-
-pub use threads::{ThreadPool, threads};
-
-pub use selection::{LabelFields, Selection, Target};
+pub use selection::{LabelFields, MOST_VERTICES, Selection, TargetCrs};
 pub use survey::{Survey, survey};
+pub use threads::{ThreadPool, threads};

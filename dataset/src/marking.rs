@@ -2,7 +2,7 @@
 
 use crate::{
     CoordinateSystem, Error, Geometries, Result, Survey,
-    quality::{Comparison, Outlines, Quality, State},
+    quality::{BeforeAfter, Outlines, Quality, State},
     turns::turn,
     wkb,
 };
@@ -33,7 +33,7 @@ pub struct Moves<'a> {
 
 impl Moves<'_> {
     /// Where a vertex goes; none when it is no vertex of the map.
-    pub fn of(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn destination(&self, point: [f64; 2]) -> Option<[f64; 2]> {
         self.from.index_of(point).map(|index| self.to[index])
     }
 
@@ -45,7 +45,7 @@ impl Moves<'_> {
         let mut count = 0;
         wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
             count += 1;
-            self.of(point).ok_or(NotMoved::UnknownVertex(point))
+            self.destination(point).ok_or(NotMoved::UnknownVertex(point))
         })?;
         Ok(count)
     }
@@ -134,10 +134,13 @@ pub fn warnings(
     warnings
 }
 
+/// CSV files keep no column of coordinates as text among the attributes.
+const NO_TEXT_OF_GEOMETRY: &str = "@KEEP_GEOM_COLUMNS=NO";
+
 /// How any map is opened. CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked; of
 /// OpenStreetMap files layers must be read one at a time, whatever the configuration says. With @ an option concerns
 /// only drivers that have it.
-pub const OPEN_OPTIONS: [&str; 2] = ["@KEEP_GEOM_COLUMNS=NO", "@INTERLEAVED_READING=NO"];
+pub const OPEN_OPTIONS: [&str; 2] = [NO_TEXT_OF_GEOMETRY, "@INTERLEAVED_READING=NO"];
 
 /// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
 pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
@@ -148,8 +151,8 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     let (layer, attribute) = dataset.layers().find_map(find)?;
     Some(format!(
         "layer \"{layer}\" has coordinates as text in its attribute \"{attribute}\", which stays as it is: with it \
-         anybody can undo the mark; leave it out, for example with -select, or open a CSV file with \
-         KEEP_GEOM_COLUMNS=NO"
+         anybody can undo the mark; leave it out, for example with -select, or open a CSV file with {}",
+        NO_TEXT_OF_GEOMETRY.trim_start_matches('@')
     ))
 }
 
@@ -188,7 +191,8 @@ impl<'a> Unmarked<'a> {
     /// Looks at all geometries of a map.
     pub fn new(geometries: &'a Geometries, map: &Map<'a>) -> Self {
         let coords = map.vertices.coords();
-        let state = State::of(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
+        let state =
+            State::measure(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
         Unmarked { geometries, coords, measure: map.measure(), state }
     }
 
@@ -197,10 +201,14 @@ impl<'a> Unmarked<'a> {
         let get_before = |number| Cow::Owned(self.geometries.outline(number, self.coords));
         let get_after = |number| Cow::Owned(self.geometries.outline(number, &marked.coords));
         let [before, after] = [outlines(self.geometries, &get_before), outlines(self.geometries, &get_after)];
-        let state = State::of(after);
+        let state = State::measure(after);
         let grid = parameters.precision.unwrap_or(0.0);
-        let comparison =
-            Comparison { before: (before, &self.state), after: (after, &state), measure: self.measure, grid };
+        let comparison = BeforeAfter {
+            before: (before, &self.state),
+            after: (after, &state),
+            measure: self.measure,
+            grid,
+        };
         let Quality { areas, hausdorff, validity, overlaps, .. } = comparison.quality();
         Distortion {
             displacement: marked.displacement,

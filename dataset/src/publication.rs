@@ -5,7 +5,7 @@
 //! not, and undone: the same file is then in both places. The main file alone may replace another one, by a
 //! single rename. Side files that are in the way are moved into the workplace first, and back when it fails.
 
-use crate::{Error, Result, file_id::same_file, workplace::file_error};
+use crate::{Error, Result, error::file_error, file_id::same_file};
 use std::{
     ffi::OsStr,
     fs::{self, File},

@@ -89,7 +89,7 @@ impl Counts {
 }
 
 /// How to compare a layer of a file with what was meant.
-pub struct Comparison<'a> {
+pub struct ReadBack<'a> {
     /// The digits with which the layer is written.
     pub digits: Digits,
     /// Where a coordinate of the first layer was meant to be; none when nobody knows.
@@ -98,7 +98,7 @@ pub struct Comparison<'a> {
     pub last_failure: &'a dyn Fn() -> Option<String>,
 }
 
-impl Comparison<'_> {
+impl ReadBack<'_> {
     /// Compares two layers; the coordinates of the second are added to `keep`.
     ///
     /// # Errors

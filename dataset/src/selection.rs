@@ -1,11 +1,16 @@
 //! What to read of a dataset, and how.
 
-use crate::CoordinateSystem;
+use crate::{CoordinateSystem, Error, Result};
+use gdal::{Dataset, vector::LayerAccess};
+use meshmark_core::options::join_list;
 
-/// Which attributes become labels. With labels come shapes: both are for registration.
+/// The most vertices a map may have: their numbers are 32 bits wide.
+pub const MOST_VERTICES: usize = u32::MAX as usize;
+
+/// Which attributes become labels. With labels come polylines: both are for registration.
 #[derive(Debug, Clone, Copy)]
 pub enum LabelFields<'a> {
-    /// None, and no shapes: only the vertices are wanted.
+    /// None, and no polylines: only the vertices are wanted.
     None,
     /// Every string and integer field.
     All,
@@ -25,7 +30,7 @@ impl LabelFields<'_> {
 
 /// Which CRS coordinates are read in.
 #[derive(Debug, Clone, Copy)]
-pub enum Target<'a> {
+pub enum TargetCrs<'a> {
     /// Their own, which all chosen layers must share.
     Own,
     /// This one: layers in another CRS are reprojected.
@@ -44,7 +49,7 @@ pub struct Selection<'a> {
     /// Attributes to take along.
     pub labels: LabelFields<'a>,
     /// Which CRS the coordinates shall be in.
-    pub target: Target<'a>,
+    pub target: TargetCrs<'a>,
     /// Whether to keep what the geometries are made of.
     pub geometries: bool,
     /// Refuse a map of more vertices, duplicates included.
@@ -61,10 +66,23 @@ impl Default for Selection<'_> {
             layers: None,
             srs: None,
             labels: LabelFields::None,
-            target: Target::Own,
+            target: TargetCrs::Own,
             geometries: false,
-            most_vertices: crate::MOST_VERTICES,
+            most_vertices: MOST_VERTICES,
             last_failure: &|| None,
         }
     }
+}
+
+/// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
+pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
+    let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
+    if known.is_empty() {
+        return Err(Error::NoLayers);
+    }
+    if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
+        return Err(Error::UnknownLayer { name: name.clone(), known: join_list(&known) });
+    }
+    let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
+    Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())
 }

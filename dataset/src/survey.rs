@@ -1,11 +1,12 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    CoordinateSystem, Error, Geometries, LabelFields, Result, Selection, Target,
+    CoordinateSystem, Error, Geometries, Result,
     chains::{Chains, read_geometry},
     crs::{self, reproject},
     extent::Extent,
     labels, parse_srs, polylines,
+    selection::{LabelFields, Selection, TargetCrs, chosen_layers},
     turns::turn,
 };
 use gdal::{
@@ -16,7 +17,6 @@ use meshmark_core::{
     ground::Ground,
     map::Map,
     map_data::{Label, MapData, Polyline},
-    options::join_list,
     scale::ScaleLattice,
 };
 use std::collections::BTreeMap;
@@ -95,8 +95,8 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         features.insert(*index, walk.layer(&mut dataset.layer(*index)?, name)?);
     }
     let crs = match selection.target {
-        Target::Crs(target) => Some(target.clone()),
-        Target::Own | Target::Raw => walk.crs.and_then(|(_, crs)| crs),
+        TargetCrs::Crs(target) => Some(target.clone()),
+        TargetCrs::Own | TargetCrs::Raw => walk.crs.and_then(|(_, crs)| crs),
     };
     let mut chains = walk.chains;
     let coords = std::mem::take(&mut chains.coords);
@@ -111,19 +111,6 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
         crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&data.vertices, ground));
     let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
     Ok(Survey { data, crs, ground, lattice, geometries, features })
-}
-
-/// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
-pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
-    let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
-    if known.is_empty() {
-        return Err(Error::NoLayers);
-    }
-    if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
-        return Err(Error::UnknownLayer { name: name.clone(), known: join_list(&known) });
-    }
-    let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
-    Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())
 }
 
 struct Walk<'a> {
@@ -146,8 +133,8 @@ impl Walk<'_> {
             features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
                 let extent = match self.selection.target {
-                    Target::Own => Extent::of(columns[column].as_ref()),
-                    Target::Crs(_) | Target::Raw => Extent::ANY, // its CRS may be another than it says
+                    TargetCrs::Own => Extent::in_crs(columns[column].as_ref()),
+                    TargetCrs::Crs(_) | TargetCrs::Raw => Extent::ANY, // its CRS may be another than it says
                 };
                 read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
             }
@@ -163,13 +150,13 @@ impl Walk<'_> {
         }
         for (crs, chains) in columns.iter().zip(&mut of_column) {
             match self.selection.target {
-                Target::Crs(target) => reproject(&mut chains.coords, crs.as_ref(), target, name)?,
-                Target::Own if !chains.coords.is_empty() => self.check_crs(name, crs)?,
-                Target::Own | Target::Raw => {}
+                TargetCrs::Crs(target) => reproject(&mut chains.coords, crs.as_ref(), target, name)?,
+                TargetCrs::Own if !chains.coords.is_empty() => self.check_crs(name, crs)?,
+                TargetCrs::Own | TargetCrs::Raw => {}
             }
             self.chains.append(chains);
         }
-        if let (Target::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
+        if let (TargetCrs::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
             let labels = &mut self.labels[first_label..];
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             reproject(&mut points, crs.as_ref(), target, name)?;

@@ -4,7 +4,9 @@
 //! process that was killed: whoever next writes to that place undoes what was half published
 //! ([`crate::publication::recover`]) and removes it.
 
-use crate::{Error, Result, publication};
+pub use crate::error::file_error;
+
+use crate::{Result, publication};
 use std::{
     ffi::OsStr,
     fs::{self, File, Permissions, TryLockError},
@@ -90,11 +92,6 @@ pub fn folder_of(path: &Path) -> &Path {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     }
-}
-
-/// What went wrong with a file.
-pub fn file_error(action: &'static str, path: &Path, error: io::Error) -> Error {
-    Error::File { action, path: path.display().to_string(), reason: error.to_string() }
 }
 
 /// Removes the workplaces in `parent` whose processes are gone; those of other users are theirs.

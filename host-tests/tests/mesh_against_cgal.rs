@@ -2,7 +2,7 @@
 //! to break triangulations.
 
 use meshmark_core::{mesh::Mesh, vertices::VertexTable};
-use meshmark_dataset::{Selection, Target, survey};
+use meshmark_dataset::{Selection, TargetCrs, survey};
 use meshmark_host_tests::{cgal, delaunay_check::differing_edges_are_cocircular};
 use rand_chacha::{ChaCha20Rng, rand_core::Rng, rand_core::SeedableRng};
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ fn random_with_duplicates() -> Vec<[f64; 2]> {
 }
 
 fn vertices_of(map: &Path) -> VertexTable {
-    let everything = Selection { target: Target::Raw, ..Selection::default() };
+    let everything = Selection { target: TargetCrs::Raw, ..Selection::default() };
     survey(&gdal::Dataset::open(map).unwrap(), &everything).unwrap().vertices
 }
 

@@ -1,6 +1,6 @@
 //! Marking through the driver keeps real maps as good as they were, and the message is read from every kind of mark.
 
-use meshmark_core::options::{Laplacian, Shape};
+use meshmark_core::options::{Laplacian, Rigidity};
 use meshmark_host_tests::plugin::{Host, library};
 use serde_json::Value;
 
@@ -17,7 +17,7 @@ fn number(document: &Value, pointer: &str) -> f64 {
 #[test]
 fn no_polygon_becomes_invalid_and_record_and_comparison_give_the_same_figures() {
     for fixture in ["helsinki.gpkg", "kotka.gpkg", "astana.gpkg", "europe_deg.gpkg", "shapes.gpkg"] {
-        for (shape, basis) in Shape::NAMES.iter().zip(Laplacian::NAMES) {
+        for (shape, basis) in Rigidity::NAMES.iter().zip(Laplacian::NAMES) {
             let host = Host::new();
             host.copy(fixture, "map.gpkg");
             let (shape, basis) = (format!("SHAPE={shape}"), format!("BASIS={basis}"));

@@ -31,6 +31,7 @@ typedef const char **MeshmarkFieldNames;
 #endif
 
 constexpr const char *MESHMARK_DRIVER = "MESHMARK";
+// PREFIX of dataset/src/marked_view.rs is the same for Rust.
 constexpr const char *MESHMARK_PREFIX = "MESHMARK:";
 
 // --- from C++ to Rust (src/ffi.rs) ---------------------------------------------------------------

@@ -4,13 +4,15 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::{Collector, guarded, report, silence_panics},
-    ffi_source::{Borrowed, OwnedSource, strings, text},
-    marking::{Marking, Request, Source, split_options},
+    ffi_source::{Borrowed, OwnedSource},
+    ffi_text::{strings, text},
+    marking::{Marking, MarkingRequest, Source, split_options},
     source_files::{is_being_read, save_copies},
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
 use meshmark_dataset::{
+    marked_view::PREFIX,
     marking::{NotMoved, coordinates_as_text},
     threads,
 };
@@ -77,8 +79,7 @@ unsafe extern "C" fn meshmark_open(
         let (name, options, source) = unsafe { (text(name), strings(options), &mut *source) };
         let opened = request(&options).and_then(|request| {
             let opened = OwnedSource::open(&name, asks_for_native_data(&options))?;
-            // SAFETY: `opened` outlives the borrow.
-            let marking = mark(name.clone(), &request, &unsafe { Borrowed::new(opened.handle()) })?;
+            let marking = mark(name.clone(), &request, &opened.dataset())?;
             marking.write_record(&request)?;
             *source = opened.into_handle();
             Ok(marking)
@@ -96,7 +97,7 @@ fn asks_for_native_data(options: &[String]) -> bool {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) -> *mut Marking {
     guarded(ptr::null_mut(), || {
-        // SAFETY: the shim gives an open dataset and an option list.
+        // SAFETY: the shim gives an option list, and a dataset that stays open during the call.
         let (source, options) = unsafe { (Borrowed::new(source), strings(options)) };
         let name = source.name();
         let marking = request(&options).and_then(|request| {
@@ -214,13 +215,13 @@ extern "C" fn meshmark_creation_option_list() -> *const c_char {
 
 // --- helpers -------------------------------------------------------------------------------------
 
-fn request(options: &[String]) -> Result<Request> {
-    Request::new(&split_options(options)?, default_key_path())
+fn request(options: &[String]) -> Result<MarkingRequest> {
+    MarkingRequest::new(&split_options(options)?, default_key_path())
 }
 
 /// Marks the dataset, with GDAL's own messages collected instead of emitted: streaming will emit
 /// those that matter again.
-pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Marking> {
+pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
     }
@@ -240,9 +241,7 @@ pub fn mark(name: String, request: &Request, source: &Borrowed) -> Result<Markin
 fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
     match marking {
         Ok(mut marking) => {
-            for warning in std::mem::take(&mut marking.warnings) {
-                report(CPLErr::CE_Warning, format!("MESHMARK:{name}: {warning}"));
-            }
+            warn(name, &std::mem::take(&mut marking.warnings));
             Box::into_raw(Box::new(marking))
         }
         Err(error) => {
@@ -252,8 +251,14 @@ fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
     }
 }
 
+/// Emits the one error of a marked view of this name.
 pub fn fail(name: &str, error: &Error) {
-    report(CPLErr::CE_Failure, format!("MESHMARK:{name}: {error}"));
+    report(CPLErr::CE_Failure, format!("{PREFIX}{name}: {error}"));
+}
+
+/// Emits its warnings.
+pub fn warn(name: &str, warnings: &[String]) {
+    warnings.iter().for_each(|warning| report(CPLErr::CE_Warning, format!("{PREFIX}{name}: {warning}")));
 }
 
 pub fn default_key_path() -> Option<String> {

@@ -1,11 +1,13 @@
 //! GDAL's errors: ours go out once, those of what we call are collected, and panics become errors.
 
-use gdal_sys::{CPLErr, CPLErrorNum};
+use crate::error::{Error, Result};
+use gdal_sys::{CPLErr, CPLErrorNum, OGRErr};
 use std::{
     any::Any,
     cell::RefCell,
     ffi::{CStr, CString, c_char},
     fmt::Display,
+    marker::PhantomData,
     panic::{self, AssertUnwindSafe},
     sync::{Mutex, PoisonError},
 };
@@ -59,8 +61,8 @@ fn take_panic_place() -> String {
     PANIC_PLACE.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
 }
 
-/// Catches the errors of the GDAL functions that are called while it lives, on this thread.
-pub struct Collector(Box<RefCell<Vec<Caught>>>);
+/// Catches the errors of the GDAL functions that are called while it lives, on this thread, which it cannot leave.
+pub struct Collector(Box<RefCell<Vec<Caught>>>, PhantomData<*const ()>);
 
 struct Caught {
     class: CPLErr::Type,
@@ -77,7 +79,7 @@ impl Collector {
             gdal_sys::CPLPushErrorHandlerEx(Some(collect), user_data);
             gdal_sys::CPLSetCurrentErrorHandlerCatchDebug(0); // those of CPL_DEBUG go their way
         }
-        Collector(caught)
+        Collector(caught, PhantomData)
     }
 
     /// The first failure since the last [`Collector::clear`].
@@ -121,6 +123,20 @@ pub fn hush() {
 pub fn unhush() {
     // SAFETY: pops the handler that `hush` pushed; without one, GDAL does nothing.
     unsafe { gdal_sys::CPLPopErrorHandler() };
+}
+
+/// Fails with what GDAL reported while `what` was tried, unless its answer is that there was no error.
+pub fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
+    match error {
+        OGRErr::OGRERR_NONE => Ok(()),
+        _ => Err(failure(what(), collector)),
+    }
+}
+
+/// The failure of `what`, with the reason that GDAL gave.
+pub fn failure(what: String, collector: &Collector) -> Error {
+    let reason = collector.first_failure().unwrap_or_else(|| "GDAL gives no reason".into());
+    Error::Writing { what, reason }
 }
 
 unsafe extern "C" fn collect(class: CPLErr::Type, number: CPLErrorNum, message: *const c_char) {

@@ -2,9 +2,8 @@
 
 use crate::{
     error::{Error, Result},
-    ffi_errors::Collector,
-    ffi_output::{c_string, check},
-    ffi_source::text,
+    ffi_errors::{Collector, check},
+    ffi_text::{c_string, text},
 };
 use gdal_sys::OGRFeatureH;
 use std::{

@@ -3,8 +3,7 @@
 use crate::{
     ffi_errors::guarded,
     ffi_features::{Feature, FeatureRef},
-    ffi_output::c_string,
-    ffi_source::{strings, text},
+    ffi_text::{c_string, strings, text},
 };
 use gdal_sys::OGRFeatureH;
 use meshmark_dataset::geojson_text::{MEDIA_TYPE, without_places};

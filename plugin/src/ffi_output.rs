@@ -1,14 +1,14 @@
 //! Datasets that are written, by GDAL's C API: layers, fields, features, and what describes them.
 
 use crate::{
-    error::{Error, Result},
-    ffi_errors::Collector,
+    error::Result,
+    ffi_errors::{Collector, check, failure},
     ffi_features::Feature,
     ffi_native_data::{NATIVE_DATA, item_without_places, meshmark_native_data},
-    ffi_source::{strings, text},
+    ffi_text::{c_string, strings, text},
 };
 use gdal_sys::{
-    GDALDatasetH, OGRErr, OGRFieldDefnH, OGRFieldSubType, OGRFieldType, OGRLayerH, OGRSpatialReferenceH,
+    GDALDatasetH, OGRFieldDefnH, OGRFieldSubType, OGRFieldType, OGRLayerH, OGRSpatialReferenceH,
     OGRwkbGeometryType,
 };
 use std::{
@@ -475,20 +475,4 @@ impl Described {
     pub unsafe fn new(dataset: GDALDatasetH) -> Self {
         Described(dataset)
     }
-}
-
-pub(crate) fn c_string(text: &str) -> CString {
-    CString::new(text).expect("it was a C string")
-}
-
-pub(crate) fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
-    match error {
-        OGRErr::OGRERR_NONE => Ok(()),
-        _ => Err(failure(what(), collector)),
-    }
-}
-
-fn failure(what: String, collector: &Collector) -> Error {
-    let reason = collector.first_failure().unwrap_or_else(|| "GDAL gives no reason".into());
-    Error::Writing { what, reason }
 }

@@ -4,14 +4,16 @@ use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
     ffi_features::Feature,
+    ffi_text::{strings, text},
     marking::Marking,
     source_files::SourceFiles,
 };
 use gdal::{Dataset, GdalOpenFlags};
 use gdal_sys::{GDALDatasetH, OGRLayerH};
-use meshmark_dataset::marking::OPEN_OPTIONS;
+use meshmark_dataset::{marked_view, marking::OPEN_OPTIONS};
 use std::{
     ffi::{CStr, CString, c_char, c_void},
+    marker::PhantomData,
     mem::ManuallyDrop,
     ops::Deref,
     path::PathBuf,
@@ -23,7 +25,6 @@ unsafe extern "C" {
     fn meshmark_shim_view(source: GDALDatasetH, marking: *mut c_void) -> GDALDatasetH;
 }
 
-const PREFIX: &str = "MESHMARK:";
 const DRIVER: &CStr = c"MESHMARK";
 
 /// A dataset handle that holds one reference and gives it up when dropped.
@@ -36,7 +37,7 @@ impl OwnedSource {
         if name.trim().is_empty() {
             return Err(Error::NoSource);
         }
-        if name.get(..PREFIX.len()).is_some_and(|start| start.eq_ignore_ascii_case(PREFIX)) {
+        if marked_view::is_named_by(name) {
             return Err(Error::Marked("a marked view"));
         }
         let c_name = CString::new(name).expect("it was a C string");
@@ -70,8 +71,10 @@ impl OwnedSource {
         ManuallyDrop::new(self).0
     }
 
-    pub fn handle(&self) -> GDALDatasetH {
-        self.0
+    /// The dataset, which lives as long as this.
+    pub fn dataset(&self) -> Borrowed<'_> {
+        // SAFETY: the handle is open, and the borrow of `self` keeps its reference from being given up.
+        unsafe { Borrowed::new(self.0) }
     }
 }
 
@@ -105,8 +108,9 @@ impl View {
         unsafe { &*self.marking }
     }
 
-    pub fn dataset(&self) -> Borrowed {
-        // SAFETY: callers drop it before the view, as its users in this crate do within one function.
+    /// The marked dataset, which lives as long as this.
+    pub fn dataset(&self) -> Borrowed<'_> {
+        // SAFETY: the handle is open, and the borrow of `self` keeps the view from closing it.
         unsafe { Borrowed::new(self.handle) }
     }
 
@@ -153,15 +157,15 @@ fn is_raster(name: &CStr) -> bool {
     known(GdalOpenFlags::GDAL_OF_RASTER) && !known(GdalOpenFlags::GDAL_OF_VECTOR)
 }
 
-/// A dataset of somebody else, for the `gdal` crate: it is not closed here.
-pub struct Borrowed(ManuallyDrop<Dataset>);
+/// A dataset of somebody else, open for `'a`, for the `gdal` crate: it is not closed here.
+pub struct Borrowed<'a>(ManuallyDrop<Dataset>, PhantomData<&'a Dataset>);
 
-impl Borrowed {
+impl Borrowed<'_> {
     /// # Safety
-    /// `handle` is an open dataset and stays so while this lives.
+    /// `handle` is an open dataset and stays so for the lifetime of the result, which the caller chooses.
     pub unsafe fn new(handle: GDALDatasetH) -> Self {
         // SAFETY: the handle is open; ManuallyDrop keeps the wrapper from closing it.
-        Borrowed(ManuallyDrop::new(unsafe { Dataset::from_c_dataset(handle) }))
+        Borrowed(ManuallyDrop::new(unsafe { Dataset::from_c_dataset(handle) }), PhantomData)
     }
 
     pub fn is_meshmark(&self) -> bool {
@@ -213,7 +217,7 @@ impl Borrowed {
     }
 }
 
-impl Deref for Borrowed {
+impl Deref for Borrowed<'_> {
     type Target = Dataset;
     fn deref(&self) -> &Dataset {
         &self.0
@@ -223,7 +227,7 @@ impl Deref for Borrowed {
 /// While it lives, the layers of a dataset yield no attributes.
 pub struct GeometryOnly<'a> {
     layers: Vec<OGRLayerH>,
-    _dataset: &'a Borrowed,
+    _dataset: &'a Borrowed<'a>,
 }
 
 impl Drop for GeometryOnly<'_> {
@@ -257,28 +261,4 @@ unsafe fn ignore_attributes(layer: OGRLayerH) {
         names.extend([c"OGR_STYLE".as_ptr(), ptr::null()]);
         gdal_sys::OGR_L_SetIgnoredFields(layer, names.as_mut_ptr());
     }
-}
-
-/// The strings of a GDAL list.
-///
-/// # Safety
-/// `list` is null or an array of C strings that ends in null.
-pub unsafe fn strings(list: *const *const c_char) -> Vec<String> {
-    if list.is_null() {
-        return Vec::new();
-    }
-    // SAFETY: every element before the null is a C string.
-    unsafe { (0..).map(|i| *list.add(i)).take_while(|s| !s.is_null()).map(|s| text(s)).collect() }
-}
-
-/// A C string's text; empty for null.
-///
-/// # Safety
-/// `string` is null or a C string.
-pub unsafe fn text(string: *const c_char) -> String {
-    if string.is_null() {
-        return String::new();
-    }
-    // SAFETY: it is a C string.
-    unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned()
 }

@@ -2,12 +2,13 @@
 
 use crate::{
     error::{Error, Result},
-    ffi::{default_key_path, fail, mark},
+    ffi::{default_key_path, fail, mark, warn},
     ffi_errors::{guarded, report},
     ffi_features::FeatureRef,
     ffi_output::{Described, Field, LayerSpec},
-    ffi_source::{Borrowed, OwnedSource, strings, text},
-    marking::{Request, split_options},
+    ffi_source::Borrowed,
+    ffi_text::{strings, text},
+    marking::{MarkingRequest, split_options},
     target::Target,
     writer::Writer,
 };
@@ -64,7 +65,7 @@ fn new_writer(name: &str, options: &[String]) -> Result<Writer> {
     if name.contains(char::REPLACEMENT_CHARACTER) {
         return Err(Error::NotUtf8("the name of the target".into()));
     }
-    let request = Request::new(&marking, default_key_path())?;
+    let request = MarkingRequest::new(&marking, default_key_path())?;
     Writer::new(Target::new(name, &creation)?, request)
 }
 
@@ -173,14 +174,11 @@ unsafe extern "C" fn meshmark_writer_finish(
             (*Box::from_raw(writer), Described::new(described), failure)
         };
         let name = writer.name().to_string();
-        let mark_source = |request: &Request, source: &OwnedSource| {
-            // SAFETY: the source is open during the call.
-            mark(name.clone(), request, &unsafe { Borrowed::new(source.handle()) })
-        };
+        let mark_source = |request: &MarkingRequest, source: &Borrowed| mark(name.clone(), request, source);
         let finished = writer.finish(&described, host_failure, &mark_source, threads());
         match finished {
             Ok(warnings) => {
-                warnings.iter().for_each(|w| report(CPLErr::CE_Warning, format!("MESHMARK:{name}: {w}")));
+                warn(&name, &warnings);
                 true
             }
             Err(error) => {

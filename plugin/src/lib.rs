@@ -22,6 +22,7 @@ mod ffi_features;
 mod ffi_native_data;
 mod ffi_output;
 mod ffi_source;
+mod ffi_text;
 mod ffi_writer;
 mod marking;
 mod output;

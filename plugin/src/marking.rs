@@ -9,24 +9,20 @@ use gdal::Dataset;
 use meshmark_core::{
     carrier::Carrier,
     demodulation, embedding,
-    key::SecretKey,
+    key::{SecretKey, read_text},
     options::{Options, Spelling, Subject},
     patches::Patches,
 };
 use meshmark_dataset::{
-    LabelFields, MOST_VERTICES, Selection, Survey, Target, ThreadPool,
+    LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, ThreadPool,
     decimals::Digits,
     marking::{self, Moves, Unmarked},
     same_file, survey,
 };
-use std::{fs::File, io::Read, path::Path};
-use zeroize::Zeroizing;
+use std::{fs::File, path::Path};
 
 /// What GDAL adds to the open options of any driver.
 const HINTS_OF_GDAL: [&str; 3] = ["NATIVE_DATA", "VALIDATE_OPEN_OPTIONS", "NOLOCK"];
-
-/// A key file has 150 bytes; a mistaken /dev/zero has no end.
-const LONGEST_KEY_FILE: u64 = 65_536;
 
 /// Splits NAME=VALUE texts.
 pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
@@ -42,14 +38,14 @@ pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
 }
 
 /// The options of one marking, checked as far as that is possible without the map.
-pub struct Request {
+pub struct MarkingRequest {
     options: Options,
     subject: Subject,
     key: SecretKey,
     key_path: String,
 }
 
-impl Request {
+impl MarkingRequest {
     /// Parses the options and reads the key file. `default_key_path` serves when no KEY is given.
     pub fn new(pairs: &[(String, String)], default_key_path: Option<String>) -> Result<Self> {
         let ours =
@@ -65,7 +61,7 @@ impl Request {
                 return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
-        Ok(Request { options, subject, key, key_path })
+        Ok(MarkingRequest { options, subject, key, key_path })
     }
 
     /// Makes it choose layers by the names they have where they are staged; those that have none are left to be found missing.
@@ -96,9 +92,7 @@ fn pool(threads: usize) -> Result<ThreadPool> {
 
 fn read_key(path: &str) -> Result<SecretKey> {
     let unreadable = |e: std::io::Error| Error::KeyUnreadable { path: path.into(), reason: e.to_string() };
-    let mut text = Zeroizing::new(String::with_capacity(1024));
-    let file = File::open(path).map_err(unreadable)?;
-    file.take(LONGEST_KEY_FILE).read_to_string(&mut text).map_err(unreadable)?;
+    let text = File::open(path).and_then(read_text).map_err(unreadable)?;
     SecretKey::from_json(&text).map_err(|source| Error::KeyMalformed { path: path.into(), source })
 }
 
@@ -130,7 +124,7 @@ pub struct Marking {
 
 impl Marking {
     /// Surveys the source, and computes every vertex's new place on `threads` threads.
-    pub fn new(request: &Request, source: Source, threads: usize) -> Result<Self> {
+    pub fn new(request: &MarkingRequest, source: Source, threads: usize) -> Result<Self> {
         let options = &request.options;
         check_record_is_no_source(options, &source.files)?;
         output::check_is_not_source(&source.files)?;
@@ -165,16 +159,21 @@ impl Marking {
     }
 
     /// Writes the record where the request wants it.
-    pub fn write_record(&self, request: &Request) -> Result<()> {
+    pub fn write_record(&self, request: &MarkingRequest) -> Result<()> {
         let wanted = request.record_path().zip(self.record.as_deref());
         wanted.map_or(Ok(()), |(path, text)| record_file::write(path, text))
     }
 
     /// Fails unless the message can be demodulated from where the vertices were found: their new places as
     /// somebody read them, in canonical order.
+    ///
+    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are no erasures for
+    /// [`demodulation::joint`] to leave out, and the noise that it would weigh, the rounding to the digits of the
+    /// format, has no estimate here. [`embedding`] knows the noise of its own grid and uses `joint`. The two checks
+    /// stay different because either demodulator refuses other outputs than the other one.
     pub fn check_message(
         &self,
-        request: &Request,
+        request: &MarkingRequest,
         found: &[[f64; 2]],
         digits: Digits,
         threads: usize,
@@ -237,7 +236,7 @@ fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<Stri
         layers: options.layers.as_deref(),
         srs: options.srs.as_deref(),
         labels: LabelFields::None,
-        target: Target::Own,
+        target: TargetCrs::Own,
         geometries: options.record_path.is_some(),
         most_vertices: MOST_VERTICES,
         last_failure,

@@ -9,6 +9,7 @@ use crate::{
     error::{Error, Result},
     source_files::{SourceFiles, same_place},
 };
+use meshmark_dataset::marked_view;
 use std::path::Path;
 
 /// Options of ogr2ogr that name another input.
@@ -41,7 +42,7 @@ fn target(arguments: &[String], is_asked_for: impl Fn(&Path) -> bool) -> Option<
     if Path::new(program).file_name()? != "ogr2ogr" {
         return None;
     }
-    let source = rest.iter().position(|a| a.get(..9).is_some_and(|p| p.eq_ignore_ascii_case("MESHMARK:")))?;
+    let source = rest.iter().position(marked_view::is_named_by)?;
     let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
     let named = (0..source).find(|&at| !is_input(at) && is_asked_for(Path::new(&rest[at])))?;
     Some(&rest[named])

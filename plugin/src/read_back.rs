@@ -4,12 +4,12 @@ use crate::{
     error::{Error, Result},
     ffi_errors::Collector,
     ffi_source::View,
-    marking::Request,
+    marking::MarkingRequest,
 };
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use meshmark_dataset::{
     formats::Format,
-    read_back::{Comparison, Difference},
+    read_back::{Difference, ReadBack},
 };
 use std::path::Path;
 
@@ -35,7 +35,7 @@ pub struct WrittenLayer {
 
 /// Fails unless the file holds the features of the marked map, within the precision of its format, and the
 /// message.
-pub fn check(written: &Written, view: &View, request: &Request, threads: usize) -> Result<()> {
+pub fn check(written: &Written, view: &View, request: &MarkingRequest, threads: usize) -> Result<()> {
     let file = open(written)?;
     let meant = view.dataset();
     let mut vertices = Vec::new();
@@ -44,7 +44,7 @@ pub fn check(written: &Written, view: &View, request: &Request, threads: usize) 
         let keep = view.marking().marks_layer(&layer.staged).then_some(&mut vertices);
         let collector = Collector::new();
         let last_failure = || collector.first_failure();
-        let comparison = Comparison { digits, place: &Some, last_failure: &last_failure };
+        let comparison = ReadBack { digits, place: &Some, last_failure: &last_failure };
         // The only layer of a file may bear the file's name.
         let in_file = match written.format.many_layers {
             true => file.layer_by_name(&layer.name),

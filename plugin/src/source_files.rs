@@ -18,9 +18,6 @@ use std::{
     },
 };
 
-/// What SQLite puts beside a database that is being written.
-const SIDECARS: [&str; 2] = ["-journal", "-wal"];
-
 /// Every open source of this process, for [`is_being_read`].
 static OPEN: Mutex<Vec<OpenSource>> = Mutex::new(Vec::new());
 static NEXT_NUMBER: AtomicU64 = AtomicU64::new(0);
@@ -41,13 +38,13 @@ pub struct SourceFiles {
 
 struct Watched {
     path: PathBuf,
-    state: State,
+    state: FileState,
     sidecars: [u64; 2],
 }
 
 /// Another state is another content.
 #[derive(PartialEq)]
-struct State {
+struct FileState {
     id: FileId,
     length: u64,
     modified: (i64, i64),
@@ -60,7 +57,7 @@ impl SourceFiles {
         let number = NEXT_NUMBER.fetch_add(1, Ordering::Relaxed);
         let folders = match files.len() {
             0 | 1 => Vec::new(),
-            _ => files.iter().filter_map(|file| FileId::of(file.path.parent()?)).collect(),
+            _ => files.iter().filter_map(|file| FileId::at(file.path.parent()?)).collect(),
         };
         let ids = files.iter().map(|file| (file.path.clone(), file.state.id)).collect();
         open_sources().push(OpenSource { number, files: ids, folders, copies: Vec::new() });
@@ -69,14 +66,14 @@ impl SourceFiles {
 
     /// Whether `path` is one of the files, by any name.
     pub fn contain(&self, path: &Path) -> bool {
-        FileId::of(path).is_some_and(|id| self.files.iter().any(|file| file.state.id == id))
+        FileId::at(path).is_some_and(|id| self.files.iter().any(|file| file.state.id == id))
     }
 
     /// Whether `path` is one of the files, or the folder of a dataset of several files.
     pub fn contain_or_lie_in(&self, path: &Path) -> bool {
         let several = self.files.len() > 1;
-        let is_folder = |id| self.files.iter().any(|f| f.path.parent().and_then(FileId::of) == Some(id));
-        self.contain(path) || several && FileId::of(path).is_some_and(is_folder)
+        let is_folder = |id| self.files.iter().any(|f| f.path.parent().and_then(FileId::at) == Some(id));
+        self.contain(path) || several && FileId::at(path).is_some_and(is_folder)
     }
 
     /// Fails when a file is not what it was, or when a transaction on it is under way.
@@ -109,19 +106,19 @@ impl Drop for SourceFiles {
 impl Watched {
     fn new(path: PathBuf) -> Option<Self> {
         let metadata = fs::metadata(&path).ok().filter(Metadata::is_file)?;
-        Some(Watched { sidecars: sidecar_lengths(&path), path, state: State::of(&metadata) })
+        Some(Watched { sidecars: sidecar_lengths(&path), path, state: FileState::new(&metadata) })
     }
 
     fn is_unchanged(&self) -> bool {
-        let same = fs::metadata(&self.path).is_ok_and(|metadata| State::of(&metadata) == self.state);
+        let same = fs::metadata(&self.path).is_ok_and(|metadata| FileState::new(&metadata) == self.state);
         // They may go (another reader closed last) but not grow (a writer is at work).
         same && sidecar_lengths(&self.path).iter().zip(&self.sidecars).all(|(now, then)| now <= then)
     }
 }
 
-impl State {
-    fn of(metadata: &Metadata) -> Self {
-        State {
+impl FileState {
+    fn new(metadata: &Metadata) -> Self {
+        FileState {
             id: FileId::of_metadata(metadata),
             length: metadata.len(),
             modified: (metadata.mtime(), metadata.mtime_nsec()),
@@ -141,14 +138,14 @@ pub fn is_being_read(path: &Path) -> bool {
     if sources.is_empty() {
         return false;
     }
-    let Some(id) = FileId::of(path) else { return false };
+    let Some(id) = FileId::at(path) else { return false };
     sources.iter().any(|source| source.is_written_by(id))
 }
 
 /// Copies the files of the open source that is about to be overwritten at `path`. The copies stay only
 /// if it comes to that.
 pub fn save_copies(path: &Path) -> io::Result<()> {
-    let Some(id) = FileId::of(path) else { return Ok(()) };
+    let Some(id) = FileId::at(path) else { return Ok(()) };
     let mut open = open_sources();
     for source in open.iter_mut().filter(|source| source.copies.is_empty() && source.is_written_by(id)) {
         for (file, _) in &source.files {
@@ -178,8 +175,13 @@ impl OpenSource {
     }
 }
 
+/// What SQLite puts beside a database that is being written.
+pub fn sidecars(path: &Path) -> [PathBuf; 2] {
+    ["-journal", "-wal"].map(|suffix| with_suffix(path, suffix))
+}
+
 fn sidecar_lengths(path: &Path) -> [u64; 2] {
-    SIDECARS.map(|suffix| fs::metadata(with_suffix(path, suffix)).map_or(0, |metadata| metadata.len()))
+    sidecars(path).map(|sidecar| fs::metadata(sidecar).map_or(0, |metadata| metadata.len()))
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

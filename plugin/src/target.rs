@@ -2,7 +2,8 @@
 
 use crate::{
     error::{Error, Result},
-    marking::Request,
+    marking::MarkingRequest,
+    source_files::sidecars,
 };
 use meshmark_core::options::Creation;
 use meshmark_dataset::{
@@ -15,9 +16,6 @@ use std::{
     fs,
     path::{Path, PathBuf},
 };
-
-/// What SQLite puts beside a database that is being written.
-const SIDECARS: [&str; 2] = ["-journal", "-wal"];
 
 /// The file to write.
 pub struct Target {
@@ -84,7 +82,7 @@ impl Target {
     }
 
     /// Makes the workplaces, which removes what killed processes left, and checks that nothing is in the way.
-    pub fn places(&self, request: &Request) -> Result<Places> {
+    pub fn places(&self, request: &MarkingRequest) -> Result<Places> {
         if same_file(&self.path, request.key_path()) {
             return Err(Error::SameFile { option: "KEY", other: "the target" });
         }
@@ -167,15 +165,14 @@ fn place(path: &Path) -> Result<PathBuf> {
 
 /// Another program's journal would be applied to the new file.
 fn check_not_busy(path: &Path) -> Result<()> {
-    for suffix in SIDECARS {
-        let mut sidecar = path.as_os_str().to_os_string();
-        sidecar.push(suffix);
-        if Path::new(&sidecar).metadata().is_ok_and(|metadata| metadata.len() > 0) {
-            let sidecar = sidecar.to_string_lossy().into_owned();
-            return Err(Error::TargetBusy { path: path.display().to_string(), sidecar });
+    let is_written = |sidecar: &PathBuf| sidecar.metadata().is_ok_and(|metadata| metadata.len() > 0);
+    match sidecars(path).into_iter().find(is_written) {
+        None => Ok(()),
+        Some(sidecar) => {
+            let [path, sidecar] = [path, &sidecar].map(|path| path.display().to_string());
+            Err(Error::TargetBusy { path, sidecar })
         }
     }
-    Ok(())
 }
 
 #[cfg(test)]

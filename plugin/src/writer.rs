@@ -12,8 +12,8 @@ use crate::{
     error::{Error, Result},
     ffi_features::FeatureRef,
     ffi_output::{Described, Field, LayerSpec, Output},
-    ffi_source::{OwnedSource, View},
-    marking::{Marking, Request},
+    ffi_source::{Borrowed, OwnedSource, View},
+    marking::{Marking, MarkingRequest},
     read_back,
     staged_layer::StagedLayer,
     target::{Places, Target},
@@ -25,7 +25,7 @@ use meshmark_dataset::{
 use std::{fs, path::Path};
 
 /// Marks an open dataset; the border knows how.
-pub type Mark<'a> = &'a dyn Fn(&Request, &OwnedSource) -> Result<Marking>;
+pub type Mark<'a> = &'a dyn Fn(&MarkingRequest, &Borrowed) -> Result<Marking>;
 
 /// A dataset under construction.
 pub struct Writer {
@@ -33,7 +33,7 @@ pub struct Writer {
     schema: Output,
     staged: Output,
     target: Target,
-    request: Request,
+    request: MarkingRequest,
     layers: Vec<StagedLayer>,
     open_transactions: usize,
     /// Why nothing will be published.
@@ -43,7 +43,7 @@ pub struct Writer {
 
 impl Writer {
     /// Checks where to write, and makes workplaces there.
-    pub fn new(target: Target, request: Request) -> Result<Self> {
+    pub fn new(target: Target, request: MarkingRequest) -> Result<Self> {
         let places = target.places(&request)?;
         let driver = target.format.driver;
         let schema = Output::create(driver, &places.main.subfolder("schema")?.join(target.file_name()))?;
@@ -160,7 +160,7 @@ impl Writer {
         staged.commit()?;
         staged.close()?;
         let source = OwnedSource::open(&places.staged.display().to_string(), false)?;
-        let marking = mark(&request, &source)?;
+        let marking = mark(&request, &source.dataset())?;
         let view = View::new(source, marking)?;
         let folder = places.main.subfolder("out")?;
         let file = folder.join(target.file_name());

@@ -3,7 +3,7 @@
 use meshmark_core::{
     code::Code,
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
-    options::{Kind, Laplacian, OPTIONS, Shape},
+    options::{Kind, Laplacian, OPTIONS, Rigidity},
     record::{Record, Reference, TopologyEntry},
 };
 use serde_json::{Value, json};
@@ -82,7 +82,7 @@ fn record() -> Record {
         chip_rate: 2,
         patch_size: 480,
         tolerance_m: 0.75,
-        shape: Shape::Free,
+        shape: Rigidity::Free,
         basis: Laplacian::Biggs,
         precision_crs_units: None,
         layers: None,

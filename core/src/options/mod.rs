@@ -8,16 +8,13 @@ mod table;
 
 pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
-pub use parameters::{Laplacian, Parameters, Shape};
-pub use table::{CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, Spelling, spec};
-
-use crate::{
-    Error, Result,
-    code::Code,
-    key::{RECIPIENT_BITS, SecretKey},
-    message::Message,
-    whitening::whiten,
+pub use parameters::{Code, Laplacian, Parameters, Rigidity};
+pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
+pub use table::{
+    CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
 };
+
+use crate::{Error, Result, key::SecretKey, message::Message, whitening::whiten};
 
 /// What the mark says: a name, or the bits themselves.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,7 +105,7 @@ impl Options {
                 chip_rate: values.integer("CHIP_RATE")?.unwrap_or(code.default_chip_rate()),
                 patch_size: values.integer("PATCH_SIZE")?.expect("has a default"),
                 tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
-                shape: values.choice("SHAPE", Shape::from_name)?.expect("has a default"),
+                shape: values.choice("SHAPE", Rigidity::from_name)?.expect("has a default"),
                 laplacian: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
                 precision,
             },
@@ -116,6 +113,13 @@ impl Options {
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
         })
+    }
+}
+
+impl Default for Parameters {
+    /// Those of a message as long as a recipient's.
+    fn default() -> Self {
+        Options::parse([]).expect("the defaults are legal").parameters
     }
 }
 
@@ -246,7 +250,7 @@ mod tests {
         let p = Parameters::default();
         assert_eq!((p.amplitude_m, p.patch_size), (0.10, 480));
         assert_eq!((p.tolerance_m, p.precision), (0.75, None));
-        assert_eq!((p.shape, p.laplacian), (Shape::Free, Laplacian::Biggs));
+        assert_eq!((p.shape, p.laplacian), (Rigidity::Free, Laplacian::Biggs));
     }
 
     #[test]

@@ -1,7 +1,5 @@
 //! The numbers and choices that shape a mark.
 
-use super::Options;
-use crate::code::Code;
 use serde::{Deserialize, Serialize};
 
 /// The numbers that shape a mark; with the key, the message and the reference they determine it.
@@ -18,36 +16,79 @@ pub struct Parameters {
     /// No vertex moves further, metres on the ground.
     pub tolerance_m: f64,
     /// What moves as one.
-    pub shape: Shape,
+    pub shape: Rigidity,
     /// Which functions carry the mark.
     pub laplacian: Laplacian,
     /// Grid of the marked coordinates, CRS units.
     pub precision: Option<f64>,
 }
 
-impl Default for Parameters {
-    /// Those of a message as long as a recipient's.
-    fn default() -> Self {
-        Options::parse([]).expect("the defaults are legal").parameters
+/// How many bits of a message LDPC carries.
+pub(crate) const LDPC_MESSAGE_BITS: usize = 128;
+/// How many channel bits it makes of them.
+pub(crate) const LDPC_CHANNEL_BITS: usize = 256;
+
+/// How the message becomes the channel bits, see [`crate::code`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Code {
+    /// The channel bits are the message bits.
+    Repetition,
+    /// 128 message bits, 256 channel bits.
+    Ldpc,
+}
+
+impl Code {
+    /// The words of the option CODE.
+    pub const NAMES: [&str; 2] = ["REPETITION", "LDPC"];
+
+    /// The code of this name, in any case.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let index = Self::NAMES.iter().position(|known| known.eq_ignore_ascii_case(name))?;
+        Some([Code::Repetition, Code::Ldpc][index])
+    }
+
+    /// The name in lower case, as records and reports have it.
+    pub fn name(self) -> String {
+        Self::NAMES[self as usize].to_lowercase()
+    }
+
+    /// CODE when it is not given: LDPC for messages it can carry, as it reads more of them from the same
+    /// displacement (docs/evaluation.md).
+    pub fn default_for(message_bits: usize) -> Self {
+        if message_bits == LDPC_MESSAGE_BITS { Code::Ldpc } else { Code::Repetition }
+    }
+
+    /// CHIP_RATE when it is not given: the same displacement with either code.
+    pub fn default_chip_rate(self) -> usize {
+        2 / self.expansion()
+    }
+
+    /// Channel bits for each message bit.
+    pub(crate) fn expansion(self) -> usize {
+        match self {
+            Code::Repetition => 1,
+            Code::Ldpc => LDPC_CHANNEL_BITS / LDPC_MESSAGE_BITS,
+        }
     }
 }
 
 /// Which vertices move as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Shape {
+pub enum Rigidity {
     /// None but what hangs on others.
     Free,
     /// Those of a building: a group of polygons that share vertices or walls, see [`crate::bodies`].
     Rigid,
 }
 
-impl Shape {
+impl Rigidity {
     /// What SHAPE may be.
     pub const NAMES: [&str; 2] = ["FREE", "RIGID"];
 
     pub(super) fn from_name(name: &str) -> Option<Self> {
-        [Shape::Free, Shape::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
+        [Rigidity::Free, Rigidity::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
     }
 
     /// The option's value.

@@ -1,11 +1,13 @@
 //! The table of the options, and how they are written.
 
-use super::{Laplacian, Shape};
-use crate::code::Code;
+use super::{Code, Laplacian, Rigidity};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
 /// need minutes and gigabytes a solve.
 pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
+
+/// How long the message of a RECIPIENT is.
+pub const RECIPIENT_BITS: usize = 128;
 
 /// What an option's value must be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,7 +162,7 @@ pub const OPTIONS: &[OptionSpec] = &[
     ),
     row(
         "SHAPE",
-        Kind::Choice(&Shape::NAMES),
+        Kind::Choice(&Rigidity::NAMES),
         Some("FREE"),
         true,
         "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them",

@@ -1,7 +1,7 @@
 //! The segments of a geometry, and what is near them.
 
 use crate::Outline;
-use robust::{Coord, orient2d};
+use meshmark_core::orientation::orientation;
 use rstar::{AABB, Envelope, PointDistance, RTree, RTreeObject, primitives::Line};
 
 /// With more segments, they are put into a tree.
@@ -85,7 +85,7 @@ impl Linework {
         let right = AABB::from_corners([x, y], [self.bounds.upper()[0], y]);
         let passes = |line: &&Line<[f64; 2]>| {
             let (a, b) = (line.from, line.to);
-            let upward = if a[1] <= b[1] { side(a, b, [x, y]) } else { side(b, a, [x, y]) };
+            let upward = if a[1] <= b[1] { orientation(a, b, [x, y]) } else { orientation(b, a, [x, y]) };
             (a[1] > y) != (b[1] > y) && upward > 0.0
         };
         self.near(right).filter(passes).count() % 2 == 1
@@ -110,16 +110,10 @@ pub fn hausdorff(before: &Outline, after: &Outline, scale: [f64; 2]) -> f64 {
     largest
 }
 
-/// Positive where `p` is on the left of the way from `a` to `b`; the sign is exact.
-fn side(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
-    let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
-    orient2d(coord(a), coord(b), coord(p))
-}
-
 /// False when the ends of one are strictly on one side of the other.
 fn may_meet(s: &Line<[f64; 2]>, t: &Line<[f64; 2]>) -> bool {
     let one_side = |s: &Line<[f64; 2]>, t: &Line<[f64; 2]>| {
-        let (a, b) = (side(s.from, s.to, t.from), side(s.from, s.to, t.to));
+        let (a, b) = (orientation(s.from, s.to, t.from), orientation(s.from, s.to, t.to));
         (a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0)
     };
     !one_side(s, t) && !one_side(t, s)

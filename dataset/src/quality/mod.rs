@@ -5,6 +5,9 @@
 
 mod linework;
 mod overlaps;
+mod sights;
+
+pub use sights::Outlines;
 
 use crate::Outline;
 use meshmark_core::{
@@ -12,59 +15,25 @@ use meshmark_core::{
     scale::Measure,
 };
 use rayon::prelude::*;
-use rstar::{AABB, Envelope};
-use std::{borrow::Cow, collections::BTreeMap};
-
-/// The geometries of a map, numbered; the same numbers before and after.
-#[derive(Clone, Copy)]
-pub struct Outlines<'a> {
-    /// How many.
-    pub count: usize,
-    /// One of them.
-    pub get: &'a (dyn Fn(usize) -> Cow<'a, Outline> + Sync),
-}
+use sights::Sight;
 
 /// A map as GEOS sees it.
 pub struct State {
     /// Of every geometry.
     sights: Vec<Sight>,
-    /// Pairs of valid polygons, the lower number first, with the area they have in common, where there is one, CRS
-    /// units squared.
-    common: BTreeMap<[u32; 2], f64>,
-}
-
-struct Sight {
-    is_valid: bool,
-    /// CRS units squared; 0 without.
-    area: f64,
-    /// Its bounding box, inside out for an empty one.
-    bounds: AABB<[f64; 2]>,
+    /// Of pairs of valid polygons.
+    common: overlaps::CommonAreas,
 }
 
 impl State {
     /// Looks at all geometries.
-    pub fn of(outlines: Outlines) -> Self {
-        let sights: Vec<Sight> =
-            (0..outlines.count).into_par_iter().map(|number| Sight::of(&(outlines.get)(number))).collect();
+    pub fn measure(outlines: Outlines) -> Self {
+        let sights: Vec<Sight> = (0..outlines.count)
+            .into_par_iter()
+            .map(|number| Sight::measure(&(outlines.get)(number)))
+            .collect();
         let common = overlaps::common_areas(outlines, &sights);
         State { sights, common }
-    }
-}
-
-impl Sight {
-    fn of(outline: &Outline) -> Self {
-        let mut bounds = AABB::new_empty();
-        outline.chains.iter().flatten().for_each(|point| bounds.merge(&AABB::from_point(*point)));
-        match outline.geometry() {
-            Some(geometry) => {
-                if !outline.is_plain() && !outline.chains.is_empty() {
-                    let whole = geometry.envelope(); // with the bellies of arcs
-                    bounds.merge(&AABB::from_corners([whole.MinX, whole.MinY], [whole.MaxX, whole.MaxY]));
-                }
-                Sight { is_valid: geometry.is_valid(), area: geometry.area(), bounds }
-            }
-            None => Sight { is_valid: false, area: 0.0, bounds },
-        }
     }
 }
 
@@ -86,7 +55,7 @@ pub struct Quality {
 }
 
 /// A map before and after.
-pub struct Comparison<'a> {
+pub struct BeforeAfter<'a> {
     /// The geometries before, and what they look like.
     pub before: (Outlines<'a>, &'a State),
     /// The geometries after, and what they look like.
@@ -97,7 +66,7 @@ pub struct Comparison<'a> {
     pub grid: f64,
 }
 
-impl Comparison<'_> {
+impl BeforeAfter<'_> {
     /// Compares.
     pub fn quality(&self) -> Quality {
         let (validity, newly_invalid) = self.validity();
@@ -118,11 +87,19 @@ impl Comparison<'_> {
         (Validity { invalid_before, invalid_after, newly_invalid: new.len() }, new)
     }
 
+    fn overlaps(&self) -> (Overlaps, Vec<[u32; 2]>) {
+        let [before, after] = [self.before.1, self.after.1];
+        let is_valid =
+            |number: u32| [before, after].iter().all(|state| state.sights[number as usize].is_valid);
+        let scale = |number: u32| self.scale(&(self.before.0.get)(number as usize));
+        overlaps::compare([&before.common, &after.common], is_valid, scale, self.grid)
+    }
+
     fn areas(&self) -> Areas {
         let polygons = self.sights().filter(|(before, _)| before.area > 0.0);
         let changes: Vec<f64> = polygons.map(|(a, b)| (b.area - a.area).abs() / a.area).collect();
         let polygons = changes.len();
-        let spread = Spread::of(changes);
+        let spread = Spread::summarise(changes);
         Areas { polygons, mean_change: spread.mean, p99_change: spread.p99, max_change: spread.max }
     }
 
@@ -131,7 +108,7 @@ impl Comparison<'_> {
             let (before, after) = ((self.before.0.get)(number), (self.after.0.get)(number));
             linework::hausdorff(&before, &after, self.scale(&before))
         };
-        let spread = Spread::of((0..self.before.0.count).into_par_iter().map(each).collect());
+        let spread = Spread::summarise((0..self.before.0.count).into_par_iter().map(each).collect());
         Hausdorff { p99_m: spread.p99, max_m: spread.max }
     }
 

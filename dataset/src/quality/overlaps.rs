@@ -1,6 +1,9 @@
 //! Polygons that overlap.
 
-use super::{Comparison, Outlines, Sight, linework::Linework};
+use super::{
+    linework::Linework,
+    sights::{Outlines, Sight},
+};
 use crate::{Outline, wkb::Step};
 use meshmark_core::distortion::Overlaps;
 use rayon::prelude::*;
@@ -18,15 +21,20 @@ const SLIVER_M2: f64 = 1e-6;
 /// Polygons with more vertices are sorted once, not for every neighbour.
 const MANY_VERTICES: usize = 256;
 
-type Box = GeomWithData<Rectangle<[f64; 2]>, u32>;
+/// The bounding box of a polygon, and its number.
+type NumberedBounds = GeomWithData<Rectangle<[f64; 2]>, u32>;
+
+/// Pairs of polygons, the lower number first, with the area they have in common, CRS units squared.
+pub(super) type CommonAreas = BTreeMap<[u32; 2], f64>;
 
 /// What pairs of valid polygons have in common, CRS units squared, where it is more than nothing.
-pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> BTreeMap<[u32; 2], f64> {
+pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> CommonAreas {
     let polygons = (0u32..).zip(sights).filter(|(_, sight)| sight.is_valid && sight.area > 0.0);
-    let boxes: Vec<Box> = polygons.map(|(number, sight)| Box::new(sight.bounds.into(), number)).collect();
+    let boxes: Vec<NumberedBounds> =
+        polygons.map(|(number, sight)| NumberedBounds::new(sight.bounds.into(), number)).collect();
     let tree = RTree::bulk_load(boxes.clone());
     let search = Search { outlines, large: large(outlines, &boxes) };
-    let of_polygon = |polygon: &Box| {
+    let of_polygon = |polygon: &NumberedBounds| {
         let near = tree.locate_in_envelope_intersecting(&sights[polygon.data as usize].bounds);
         let mut later: Vec<u32> =
             near.map(|other| other.data).filter(|other| *other > polygon.data).collect();
@@ -37,8 +45,8 @@ pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> BTreeMap<[u3
 }
 
 /// The segments of all polygons with many vertices; none for those that are not all rings.
-fn large(outlines: Outlines, boxes: &[Box]) -> BTreeMap<u32, Option<Linework>> {
-    let sorted = |polygon: &Box| {
+fn large(outlines: Outlines, boxes: &[NumberedBounds]) -> BTreeMap<u32, Option<Linework>> {
+    let sorted = |polygon: &NumberedBounds| {
         let outline = (outlines.get)(polygon.data as usize);
         let vertices: usize = outline.chains.iter().map(Vec::len).sum();
         (vertices > MANY_VERTICES).then(|| (polygon.data, rings(&outline)))
@@ -90,37 +98,31 @@ fn are_apart(one: &Option<Linework>, other: &Option<Linework>) -> bool {
     one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one.is_apart_from(other))
 }
 
-impl Comparison<'_> {
-    /// Overlaps among polygons that are valid before and after, and which are new.
-    pub(super) fn overlaps(&self) -> (Overlaps, Vec<[u32; 2]>) {
-        let (before, after) = (self.before.1, self.after.1);
-        let is_valid = |number: &u32| {
-            let number = *number as usize;
-            before.sights[number].is_valid && after.sights[number].is_valid
-        };
-        let pairs: BTreeSet<&[u32; 2]> = before.common.keys().chain(after.common.keys()).collect();
-        let valid = pairs.into_iter().filter(|pair| pair.iter().all(is_valid));
-        let all: Vec<([u32; 2], Overlap)> = valid.map(|pair| (*pair, self.overlap(pair))).collect();
-        let new: Vec<&([u32; 2], Overlap)> = all.iter().filter(|(_, overlap)| overlap.is_new()).collect();
-        let counts = Overlaps {
-            before: all.iter().filter(|(_, o)| o.is_more(o.before_m2)).count(),
-            after: all.iter().filter(|(_, o)| o.is_more(o.after_m2)).count(),
-            new: new.len(),
-            new_area_m2: new.iter().fold(0.0, |sum, (_, o)| sum + o.after_m2 - o.before_m2),
-            new_slivers: all.iter().filter(|(_, o)| o.before_m2 == 0.0 && o.is_sliver(o.after_m2)).count(),
-        };
-        (counts, new.iter().map(|(pair, _)| *pair).collect())
-    }
-
-    fn overlap(&self, pair: &[u32; 2]) -> Overlap {
-        let [x, y] = self.scale(&(self.before.0.get)(pair[0] as usize));
-        let area_m2 = |common: &BTreeMap<[u32; 2], f64>| common.get(pair).map_or(0.0, |area| area * x * y);
-        Overlap {
-            before_m2: area_m2(&self.before.1.common),
-            after_m2: area_m2(&self.after.1.common),
-            sliver_m2: SLIVER_M2.max(self.grid * self.grid * x * y),
-        }
-    }
+/// Overlaps among polygons that are valid before and after, and which are new. `common` are the common areas before
+/// and after, `scale` metres per unit at a polygon, `grid` as in [`super::BeforeAfter`].
+pub(super) fn compare(
+    common: [&CommonAreas; 2],
+    is_valid: impl Fn(u32) -> bool,
+    scale: impl Fn(u32) -> [f64; 2],
+    grid: f64,
+) -> (Overlaps, Vec<[u32; 2]>) {
+    let overlap = |pair: &[u32; 2]| {
+        let [x, y] = scale(pair[0]);
+        let [before_m2, after_m2] = common.map(|areas| areas.get(pair).map_or(0.0, |area| area * x * y));
+        Overlap { before_m2, after_m2, sliver_m2: SLIVER_M2.max(grid * grid * x * y) }
+    };
+    let pairs: BTreeSet<&[u32; 2]> = common.iter().flat_map(|areas| areas.keys()).collect();
+    let valid = pairs.into_iter().filter(|pair| pair.iter().all(|&number| is_valid(number)));
+    let all: Vec<([u32; 2], Overlap)> = valid.map(|pair| (*pair, overlap(pair))).collect();
+    let new: Vec<&([u32; 2], Overlap)> = all.iter().filter(|(_, overlap)| overlap.is_new()).collect();
+    let counts = Overlaps {
+        before: all.iter().filter(|(_, o)| o.is_more(o.before_m2)).count(),
+        after: all.iter().filter(|(_, o)| o.is_more(o.after_m2)).count(),
+        new: new.len(),
+        new_area_m2: new.iter().fold(0.0, |sum, (_, o)| sum + o.after_m2 - o.before_m2),
+        new_slivers: all.iter().filter(|(_, o)| o.before_m2 == 0.0 && o.is_sliver(o.after_m2)).count(),
+    };
+    (counts, new.iter().map(|(pair, _)| *pair).collect())
 }
 
 /// The area that two polygons have in common, square metres.
@@ -149,7 +151,7 @@ impl Overlap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quality::{Quality, State};
+    use crate::quality::{BeforeAfter, Quality, State};
     use gdal::vector::Geometry;
     use meshmark_core::{ground::Ground, scale::Measure};
     use std::borrow::Cow;
@@ -165,9 +167,9 @@ mod tests {
             [&before, &after].map(|all| move |number: usize| Cow::Borrowed(&all[number]));
         let before = Outlines { count: before.len(), get: &get_before };
         let after = Outlines { count: after.len(), get: &get_after };
-        let (states, ground) = ([before, after].map(State::of), Ground::Plane { metres_per_unit: 1.0 });
+        let (states, ground) = ([before, after].map(State::measure), Ground::Plane { metres_per_unit: 1.0 });
         let measure = Measure { ground, lattice: None };
-        Comparison { before: (before, &states[0]), after: (after, &states[1]), measure, grid }.quality()
+        BeforeAfter { before: (before, &states[0]), after: (after, &states[1]), measure, grid }.quality()
     }
 
     fn square(x: f64, y: f64, size: f64) -> String {

@@ -3,7 +3,7 @@
 //! invalid, or two overlap that did not.
 
 use clap::Parser;
-use meshmark_core::options::{Laplacian, Shape};
+use meshmark_core::options::{Laplacian, Rigidity};
 use serde_json::Value;
 use std::{
     error::Error,
@@ -53,7 +53,7 @@ fn run(Arguments { maps, mut option, precision, shapes }: Arguments) -> Result<b
     println!("{HEADER}");
     let mut good = true;
     for map in &maps {
-        for shape in Shape::NAMES.into_iter().filter(|shape| is_wanted(shape)) {
+        for shape in Rigidity::NAMES.into_iter().filter(|shape| is_wanted(shape)) {
             for basis in Laplacian::NAMES {
                 let marked = work.mark(map, shape, basis).map_err(|e| format!("{}: {e}", map.display()))?;
                 println!("{}", row(map, shape, basis, &marked));

@@ -1,9 +1,8 @@
 //! Crossings.
 
 use super::Crossings;
-use meshmark_core::scale::Measure;
+use meshmark_core::{orientation::orientation, scale::Measure};
 use rayon::prelude::*;
-use robust::{Coord, orient2d};
 use rstar::{
     AABB, RTree, RTreeObject,
     primitives::{GeomWithData, Rectangle},
@@ -56,14 +55,9 @@ fn crossing_pairs(segments: &[[u32; 2]], coords: &[[f64; 2]]) -> BTreeSet<[u32; 
     leaves.par_iter().flat_map_iter(of_segment).collect()
 }
 
-fn side(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
-    let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
-    orient2d(coord(a), coord(b), coord(p))
-}
-
 /// Whether the ends of either are on different sides of the other.
 fn cross([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
-    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+    orientation(a, b, c) * orientation(a, b, d) < 0.0 && orientation(c, d, a) * orientation(c, d, b) < 0.0
 }
 
 /// How far the nearest of the four ends of two crossing segments is from the other segment's line.

@@ -215,8 +215,8 @@ impl Pairs<'_> {
         let before = |number: usize| Cow::Borrowed(&self.features[number].before);
         let after = |number: usize| Cow::Borrowed(&self.features[number].after);
         let (before, after) = (Outlines { count, get: &before }, Outlines { count, get: &after });
-        let [was, is] = [before, after].map(State::of);
-        quality::Comparison {
+        let [was, is] = [before, after].map(State::measure);
+        quality::BeforeAfter {
             before: (before, &was),
             after: (after, &is),
             measure: self.measure,

@@ -49,7 +49,7 @@ pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
     }
     for place in places {
         let point = [place, place + 8].map(|at| f64_at(&bytes, at).unwrap_or(f64::NAN));
-        let [x, y] = moves.of(point).ok_or_else(changed)?;
+        let [x, y] = moves.destination(point).ok_or_else(changed)?;
         put(&mut bytes, place, &[x, y]);
     }
     fs::write(file, &bytes).map_err(|error| file_error("writing", file, error))?;

@@ -12,7 +12,7 @@ use meshmark_dataset::{
     formats::Format,
     marking::{self, Moves},
     publication::{Move, Publication},
-    read_back::Comparison,
+    read_back::ReadBack,
     workplace::{Workplace, file_error},
 };
 use std::{ffi::OsStr, fs, path::Path};
@@ -44,9 +44,9 @@ fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
         let (meant, in_file) = (staged.layer(number), file.layer(number));
         let moving = meant.as_ref().ok().and_then(|layer| job.stage.staged.layer(&layer.name()));
         forget_failure();
-        let comparison = Comparison {
+        let comparison = ReadBack {
             digits: job.format.digits(&[]),
-            place: &|point| if moving.is_some() { moves.of(point) } else { Some(point) },
+            place: &|point| if moving.is_some() { moves.destination(point) } else { Some(point) },
             last_failure: &last_failure,
         };
         let compared = match (moving, in_file) {

@@ -1,6 +1,7 @@
 //! The files of a verification and what identifies them.
 
 use crate::{Error, Result, words::printable};
+use meshmark_core::hex;
 use meshmark_dataset::workplace::folder_of;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -69,7 +70,11 @@ pub(crate) fn digest(path: &Path) -> Result<Digested> {
                 let name = file.file_name().unwrap_or_default().to_string_lossy();
                 let _ = writeln!(list, "{}  {name}", file_digest(file).map_err(failed)?);
             }
-            format!("SHA-256 {} of the sha256sum list of its {} files", hex(list.as_bytes()), files.len())
+            format!(
+                "SHA-256 {} of the sha256sum list of its {} files",
+                text_digest(list.as_bytes()),
+                files.len()
+            )
         }
     };
     Ok(Digested { path: shown, digest })
@@ -105,18 +110,14 @@ fn file_digest(path: &Path) -> io::Result<String> {
     let mut buffer = vec![0; 1 << 20];
     loop {
         match file.read(&mut buffer)? {
-            0 => return Ok(digits(&hash.finalize())),
+            0 => return Ok(hex::encode(&hash.finalize())),
             count => hash.update(&buffer[..count]),
         }
     }
 }
 
-fn hex(bytes: &[u8]) -> String {
-    digits(&Sha256::digest(bytes))
-}
-
-fn digits(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+fn text_digest(bytes: &[u8]) -> String {
+    hex::encode(&Sha256::digest(bytes))
 }
 
 #[cfg(test)]
@@ -136,12 +137,12 @@ mod tests {
         std::fs::write(file("map.gpkg"), "abc").unwrap();
         assert_eq!(digest(&file("map.gpkg")).unwrap().digest, format!("SHA-256 {ABC}"));
         let list = |names: &[&str]| names.iter().map(|n| format!("{ABC}  {n}\n")).collect::<String>();
-        let expected = hex(list(&["a.dbf", "a.shp"]).as_bytes());
+        let expected = text_digest(list(&["a.dbf", "a.shp"]).as_bytes());
         assert_eq!(
             digest(&file("a.shp")).unwrap().digest,
             format!("SHA-256 {expected} of the sha256sum list of its 2 files")
         );
-        let all = hex(list(&["a.dbf", "a.shp", "b.shp", "map.gpkg"]).as_bytes());
+        let all = text_digest(list(&["a.dbf", "a.shp", "b.shp", "map.gpkg"]).as_bytes());
         assert!(digest(folder.path()).unwrap().digest.contains(&all));
         assert!(digest(&file("none")).unwrap().digest.contains("no digest"));
     }

@@ -9,8 +9,8 @@ use meshmark_core::{
     scale::ScaleLattice,
 };
 use meshmark_dataset::{
-    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, Target, features,
-    marking, survey,
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, features,
+    marked_view, marking, survey,
 };
 use std::{collections::BTreeSet, path::Path};
 
@@ -32,7 +32,7 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     if let LabelFields::Named(names) = reading.landmarks {
         check_fields(path, &dataset, names)?;
     }
-    read("reference", path, &dataset, reading, Target::Own)
+    read("reference", path, &dataset, reading, TargetCrs::Own)
 }
 
 /// Opens a map to be marked, and reads its vertices.
@@ -41,7 +41,7 @@ pub(crate) fn source(
     options: &Options,
     warn: &mut dyn FnMut(&str),
 ) -> Result<(Dataset, Survey)> {
-    if path.as_os_str().as_encoded_bytes().get(..9).is_some_and(|p| p.eq_ignore_ascii_case(b"MESHMARK:")) {
+    if marked_view::is_named_by(path) {
         let path = path.display();
         return Err(Error::Usage(format!(
             "the map {path} is a marked view already: name the dataset itself"
@@ -50,7 +50,7 @@ pub(crate) fn source(
     let dataset = open("map", path, None)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
-    let survey = read("map", path, &dataset, &reading, Target::Own)?;
+    let survey = read("map", path, &dataset, &reading, TargetCrs::Own)?;
     marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
     Ok((dataset, survey))
 }
@@ -133,7 +133,7 @@ pub(super) fn read(
     path: &Path,
     dataset: &Dataset,
     reading: &Reading,
-    target: Target,
+    target: TargetCrs,
 ) -> Result<Survey> {
     survey_of(dataset, reading, target).map_err(|error| failed(what, path, error))
 }
@@ -141,7 +141,7 @@ pub(super) fn read(
 pub(super) fn survey_of(
     dataset: &Dataset,
     reading: &Reading,
-    target: Target,
+    target: TargetCrs,
 ) -> meshmark_dataset::Result<Survey> {
     forget_failure();
     let selection = Selection {

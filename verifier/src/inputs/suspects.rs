@@ -3,7 +3,7 @@
 use super::maps::{Reading, failed, first_crs, open, read, survey_of};
 use crate::{Error, Result, words::printable};
 use gdal::{Dataset, vector::LayerAccess};
-use meshmark_dataset::{CoordinateSystem, Survey, Target};
+use meshmark_dataset::{CoordinateSystem, Survey, TargetCrs};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -46,20 +46,20 @@ pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Sus
     let layer_crs = crs_of(&dataset);
     let crs = first_crs(&dataset);
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
-        match survey_of(&dataset, reading, Target::Crs(target)) {
+        match survey_of(&dataset, reading, TargetCrs::Crs(target)) {
             Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
             // PROJ, or the limits of what a map may be: the CRS is not that of the coordinates.
             Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
             Err(error) => return Err(failed("suspect", path, error)),
         }
     }
-    let map = read("suspect", path, &dataset, reading, Target::Raw)?;
+    let map = read("suspect", path, &dataset, reading, TargetCrs::Raw)?;
     Ok(Suspect { map, is_raw: true, layer_crs, crs })
 }
 
 /// Reads the numbers of the suspect as they stand.
 pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
-    read("suspect", path, &open_suspect(path)?, reading, Target::Raw)
+    read("suspect", path, &open_suspect(path)?, reading, TargetCrs::Raw)
 }
 
 fn open_suspect(path: &Path) -> Result<Dataset> {

@@ -17,7 +17,7 @@ pub use report_file::{Format, ReportFile};
 use crate::error::ExitCode;
 use meshmark_core::{
     code::{Code, Decoder},
-    options::{Laplacian, Shape},
+    options::{Laplacian, Rigidity},
 };
 use meshmark_detection::{
     decision::{Decoys, Null, Verdict},
@@ -124,7 +124,7 @@ pub struct ReportParameters {
     pub amplitude_m: f64,
     pub code: Code,
     pub chip_rate: usize,
-    pub shape: Shape,
+    pub shape: Rigidity,
     pub basis: Laplacian,
     pub patch_size: usize,
     pub tolerance_m: f64,
