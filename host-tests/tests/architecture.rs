@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-const CRATES: [&str; 4] = ["core", "detection", "dataset", "plugin"];
+const CRATES: [&str; 5] = ["core", "detection", "dataset", "plugin", "verifier"];
 
 #[test]
 fn no_crate_has_a_circle_of_imports() {

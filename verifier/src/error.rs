@@ -1,109 +1,183 @@
-use meshmark_core::options::Spelling;
+//! What ends a command early. Every message names the input and the remedy.
 
-/// What ends a command early. Every message names the input and the remedy.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    #[error("{0}")]
-    Usage(String),
-    #[error("{0}")]
-    DoesNotBelong(String),
-    #[error("{0}")]
-    Unreadable(String),
-    #[error("{0}")]
-    TooLarge(String),
-}
+use crate::exit_code::ExitCode;
+use meshmark_core::{counted, options::Spelling};
+use meshmark_dataset::Error as MapError;
+use std::{io, path::PathBuf};
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What the command's exit code says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ExitCode {
-    /// The mark is there.
-    Match = 0,
-    /// The mark would have shown, and does not.
-    NoMatch = 1,
-    /// The command line, an option or a key or record file is wrong.
-    Usage = 2,
-    /// The suspect cannot answer the question.
-    Inconclusive = 3,
-    /// The record does not belong to this reference or this key.
-    DoesNotBelong = 4,
-    /// An input cannot be read.
-    Unreadable = 5,
-    /// An input is too large.
-    TooLarge = 6,
-}
+/// What ends a command early.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the messages are the documentation
+pub enum Error {
+    // --- the command line, and the files it names ---
+    #[error("{}", .0.text(Spelling::Flag))]
+    Core(#[from] meshmark_core::Error),
+    #[error("{}", .0.text(Spelling::Flag))]
+    Dataset(#[from] MapError),
+    #[error("the {what} {}: {}", path.display(), source.text(Spelling::Flag))]
+    Map { what: &'static str, path: PathBuf, source: MapError },
+    #[error("the reference {}: {}", path.display(), source.text(Spelling::Flag))]
+    Unfit { path: PathBuf, source: MapError },
+    #[error("the map {}: {}", path.display(), source.text(Spelling::Flag))]
+    Refused { path: PathBuf, source: MapError },
+    #[error("{}: {source}", path.display())]
+    Malformed { path: PathBuf, source: meshmark_core::Error },
+    #[error("the {what} {} cannot be read: {source}", path.display())]
+    TextUnread { what: &'static str, path: PathBuf, source: io::Error },
+    #[error("the folder {} cannot be read: {source}", path.display())]
+    FolderUnread { path: PathBuf, source: io::Error },
+    #[error("{flag} contradicts the record: leave one of them out")]
+    Contradiction { flag: String },
+    #[error("the map {} is a marked view already: name the dataset itself", path.display())]
+    MarkedView { path: PathBuf },
+    #[error("the reference {} has no field \"{field}\": --landmark may name {known}", path.display())]
+    UnknownField { path: PathBuf, field: String, known: String },
+    #[error(
+        "the {what} is a connection with a password in it, which reports and messages would repeat: give the password by \
+         a PGPASSFILE or service file, or an environment variable of the database's driver"
+    )]
+    Password { what: &'static str },
+    #[error(
+        "no file of {} is a record of this key and this reference: give the folder the records were written to",
+        folder.display()
+    )]
+    NoRecord { folder: PathBuf },
+    #[error(
+        "the reference has {} and the marked map {marked}: compare a map with the copy that was marked from it, before \
+         anything is removed",
+        counted(*reference, "geometry")
+    )]
+    OtherCount { reference: usize, marked: usize },
+    #[error(
+        "the marked map {} is in {other} and the reference in {own}: compare the copy that was marked, before it is brought \
+         into another CRS",
+        path.display()
+    )]
+    OtherCrs { path: PathBuf, own: String, other: String },
+    #[error(
+        "layer \"{layer}\", feature {fid} of the reference does not have the vertices of its counterpart in the marked map \
+         (layer \"{other}\"): features correspond by their order"
+    )]
+    OtherVertices { layer: String, fid: String, other: String },
+    #[error("the list of recipients {} {reason}", path.display())]
+    Recipients { path: PathBuf, reason: String },
+    #[error("the report {} {reason}", path.display())]
+    ReportName { path: PathBuf, reason: String },
+    #[error("{} exists{remedy}", path.display())]
+    Exists { path: PathBuf, remedy: &'static str },
+    #[error("{} cannot be written: its folder does not exist", path.display())]
+    NoFolderFor { path: PathBuf },
+    #[error("{} {why}: move it away, or give another --output-dir", path.display())]
+    InTheWay { path: PathBuf, why: &'static str },
+    #[error("ogr2ogr cannot be run ({source}): install GDAL's programs (package gdal-bin)")]
+    NoOgr2ogr { source: io::Error },
+    #[error("this GDAL writes FlatGeobuf as no other that was seen: write GPKG, and convert the copies")]
+    UnknownFlatGeobuf,
+    #[error("no threads can be started ({reason})")]
+    Threads { reason: String },
+    #[error("the operating system gives no random bytes: {reason}")]
+    Random { reason: String },
 
-impl ExitCode {
-    /// All of them.
-    pub const ALL: [ExitCode; 7] = [
-        ExitCode::Match,
-        ExitCode::NoMatch,
-        ExitCode::Usage,
-        ExitCode::Inconclusive,
-        ExitCode::DoesNotBelong,
-        ExitCode::Unreadable,
-        ExitCode::TooLarge,
-    ];
+    // --- what does not belong together ---
+    #[error(
+        "the record was made with key {made_with}, and this is key {given}: give the key it was made with"
+    )]
+    OtherKey { made_with: String, given: String },
+    #[error("the record's message is not that of its recipient under this key: the record was changed")]
+    OtherMessage,
+    #[error(
+        "the record was made from another reference ({recorded} vertices) than {} ({vertices} vertices): give the file \
+         that was marked, unchanged",
+        path.display()
+    )]
+    OtherReference { path: PathBuf, recorded: usize, vertices: usize },
 
-    /// What it means to `meshmark verify`.
-    pub fn meaning(self) -> &'static str {
-        match self {
-            ExitCode::Match => "match",
-            ExitCode::NoMatch => "no match",
-            ExitCode::Usage => "usage",
-            ExitCode::Inconclusive => "inconclusive",
-            ExitCode::DoesNotBelong => "the record does not belong to this reference or key",
-            ExitCode::Unreadable => "unreadable input",
-            ExitCode::TooLarge => "too large",
-        }
-    }
+    // --- inputs that cannot be read ---
+    #[error("the {what} {} cannot be opened: {reason}{formats}", path.display())]
+    Unopened { what: &'static str, path: PathBuf, reason: String, formats: String },
+    #[error("the {what} {}: {source}", path.display())]
+    Unmeasured { what: &'static str, path: PathBuf, source: MapError },
+    #[error("{} cannot be read to its end: {source}", path.display())]
+    Undigested { path: PathBuf, source: io::Error },
+    #[error("the suspect {} is not a file here: give a local file", path.display())]
+    NoFile { path: PathBuf },
+    #[error("GDAL takes no option: {reason}")]
+    NoOption { reason: String },
+    #[error("the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr", path.display())]
+    OtherTables { path: PathBuf },
+    #[error("the suspect {} cannot be read: {reason}", path.display())]
+    Unread { path: PathBuf, reason: String },
+    #[error(
+        "the suspect {} has a virtual table \"{table}\", which may point at other files: copy its layers to a plain file, \
+         for example with ogr2ogr",
+        path.display()
+    )]
+    VirtualTable { path: PathBuf, table: String },
+    #[error("the map as a GeoPackage cannot be read: {reason}")]
+    StagedUnread { reason: String },
+    #[error("ogr2ogr cannot copy {} to {format}: {reason}", path.display())]
+    Ogr2ogr { path: PathBuf, format: String, reason: String },
+    #[error(
+        "the map was changed while it was read, or ogr2ogr reads other features of it: convert it to a GeoPackage, and \
+         distribute that"
+    )]
+    MapChanged,
+
+    // --- outputs that cannot be written ---
+    #[error("{what} cannot be written: {source}{remedy}")]
+    Unwritten { what: String, source: io::Error, remedy: &'static str },
+    #[error("{what} cannot be written: {reason}")]
+    NotWritten { what: String, reason: String },
+    #[error("the answer cannot be printed: {source}")]
+    Unprinted { source: io::Error },
+    #[error("the output folder {} cannot be made ({source}): name one that can be", path.display())]
+    NoFolder { path: PathBuf, source: io::Error },
+
+    // --- one of many copies ---
+    #[error("\"{recipient}\": {source}")]
+    Copy { recipient: String, source: Box<Error> },
+    #[error(
+        "{source}; {done} of {} written, and the same command again makes the rest",
+        if *all == 1 { "1 copy was".into() } else { format!("{all} copies were") }
+    )]
+    Stopped { source: Box<Error>, done: usize, all: usize },
 }
 
 impl Error {
     /// The exit code of this error.
     pub fn exit_code(&self) -> ExitCode {
+        use Error::*;
         match self {
-            Error::Usage(_) => ExitCode::Usage,
-            Error::DoesNotBelong(_) => ExitCode::DoesNotBelong,
-            Error::Unreadable(_) => ExitCode::Unreadable,
-            Error::TooLarge(_) => ExitCode::TooLarge,
+            Map { source, .. } => of_map_that_is_read(source),
+            Dataset(MapError::File { action: "writing", .. }) => ExitCode::Unwritable,
+            OtherKey { .. } | OtherMessage | OtherReference { .. } => ExitCode::DoesNotBelong,
+            Unopened { .. }
+            | Unmeasured { .. }
+            | Undigested { .. }
+            | NoFile { .. }
+            | NoOption { .. }
+            | OtherTables { .. }
+            | Unread { .. }
+            | VirtualTable { .. }
+            | StagedUnread { .. }
+            | Ogr2ogr { .. }
+            | MapChanged => ExitCode::Unreadable,
+            Unwritten { .. } | NotWritten { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
+            Copy { source, .. } | Stopped { source, .. } => source.exit_code(),
+            _ => ExitCode::Usage,
         }
     }
 }
 
-impl Error {
-    /// The same with a recipient before it.
-    pub(crate) fn of(self, recipient: &str) -> Self {
-        self.rephrased(|text| format!("\"{recipient}\": {text}"))
-    }
-
-    /// The same with more after it.
-    pub(crate) fn with(self, more: &str) -> Self {
-        self.rephrased(|text| text + more)
-    }
-
-    fn rephrased(self, f: impl FnOnce(String) -> String) -> Self {
-        match self {
-            Error::Usage(text) => Error::Usage(f(text)),
-            Error::DoesNotBelong(text) => Error::DoesNotBelong(f(text)),
-            Error::Unreadable(text) => Error::Unreadable(f(text)),
-            Error::TooLarge(text) => Error::TooLarge(f(text)),
+fn of_map_that_is_read(error: &MapError) -> ExitCode {
+    match error {
+        MapError::TooLarge { .. } => ExitCode::TooLarge,
+        MapError::UnknownLayer { .. } | MapError::UnknownSrs(_) | MapError::ContradictingSrs { .. } => {
+            ExitCode::Usage
         }
-    }
-}
-
-/// An error of a map that is written: of its format, or of a place.
-impl From<meshmark_dataset::Error> for Error {
-    fn from(error: meshmark_dataset::Error) -> Self {
-        Error::Usage(error.text(Spelling::Flag))
-    }
-}
-
-/// An error of the algorithm is one of its parameters, which are flags here.
-impl From<meshmark_core::Error> for Error {
-    fn from(error: meshmark_core::Error) -> Self {
-        Error::Usage(error.text(Spelling::Flag))
+        _ => ExitCode::Unreadable,
     }
 }

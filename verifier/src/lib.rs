@@ -7,6 +7,7 @@
 pub mod compare;
 pub mod distribute;
 mod error;
+mod exit_code;
 pub mod html;
 pub mod inputs;
 pub mod progress;
@@ -14,5 +15,6 @@ pub mod report;
 pub mod verify;
 pub mod words;
 
-pub use error::{Error, ExitCode, Result};
+pub use error::{Error, Result};
+pub use exit_code::ExitCode;
 pub use verify::{Request, verify, verify_records};

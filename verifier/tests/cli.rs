@@ -141,7 +141,7 @@ fn an_answer_may_stay_unread_and_says_when_it_cannot_be_written() {
     assert_eq!(keygen("a.json", writer.into()), (Some(0), String::new()));
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let (code, error) = keygen("b.json", full.into());
-    assert!(code == Some(2) && error.starts_with("meshmark: the answer cannot be printed: "), "{error}");
+    assert!(code == Some(7) && error.starts_with("meshmark: the answer cannot be printed: "), "{error}");
 }
 
 #[test]

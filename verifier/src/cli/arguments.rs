@@ -31,13 +31,13 @@ pub(super) enum Subcommands {
     /// Say what marking did to a map: displacement, angles, areas, topology
     ///
     /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
-    /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large.
+    /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large, 7 an output cannot be written.
     Compare(CompareArgs),
     /// Write a marked copy of a map, and its record, for every recipient of a list
     ///
     /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears when it is complete, was
     /// read back and carries its message; the same command again skips those that are there. Exit codes: 0 all copies
-    /// are there, 2 usage, or a copy that could not be written, 5 unreadable map, 6 too large.
+    /// are there, 2 usage, 5 unreadable map, 6 too large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
     /// Write man pages and shell completions, for those who make packages
     #[command(hide = true)]

@@ -48,24 +48,21 @@ fn warn(text: &str) {
 fn print(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::Usage(format!("the answer cannot be printed: {error}")))
-        }
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::Unprinted { source: error }),
         _ => Ok(()),
     }
 }
 
 fn keygen(path: &PathBuf) -> Result<ExitCode> {
     let mut secret = zeroize::Zeroizing::new([0; 32]);
-    getrandom::fill(secret.as_mut_slice())
-        .map_err(|error| Error::Usage(format!("the operating system gives no random bytes: {error}")))?;
+    getrandom::fill(secret.as_mut_slice()).map_err(|error| Error::Random { reason: error.to_string() })?;
     let key = SecretKey::from_bytes(*secret);
     let failed = |error: std::io::Error| match error.kind() {
-        std::io::ErrorKind::AlreadyExists => Error::Usage(format!(
-            "{} exists, and a key is never overwritten: name another file",
-            path.display()
-        )),
-        _ => Error::Usage(format!("the key file {} cannot be written: {error}", path.display())),
+        ErrorKind::AlreadyExists => Error::Exists {
+            path: path.clone(),
+            remedy: ", and a key is never overwritten: name another file",
+        },
+        _ => Error::Unwritten { what: format!("the key file {}", path.display()), source: error, remedy: "" },
     };
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create_new(true);
@@ -82,8 +79,9 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
 }
 
 fn write_package_files(folder: &Path) -> Result<ExitCode> {
-    package_files::write(Cli::command(), folder).map_err(|error| {
-        Error::Usage(format!("man pages and completions cannot be written to {}: {error}", folder.display()))
+    package_files::write(Cli::command(), folder).map_err(|source| {
+        let what = format!("the folder {} for man pages and completions", folder.display());
+        Error::Unwritten { what, source, remedy: "" }
     })?;
     Ok(ExitCode::Match)
 }

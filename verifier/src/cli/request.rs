@@ -76,7 +76,7 @@ fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> 
         };
         if !agrees {
             let flag = Spelling::Flag.value(name, value);
-            return Err(Error::Usage(format!("{flag} contradicts the record: leave one of them out")));
+            return Err(Error::Contradiction { flag });
         }
     }
     Ok(())

@@ -1,18 +1,31 @@
 //! Crossings.
 
-use super::Crossings;
 use meshmark_core::{orientation::orientation, scale::Measure};
 use rayon::prelude::*;
 use rstar::{
     AABB, RTree, RTreeObject,
     primitives::{GeomWithData, Rectangle},
 };
+use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Crossings up to this are rounding, metres.
 const GRAZE_M: f64 = 1e-6;
 
 type Segment = GeomWithData<Rectangle<[f64; 2]>, u32>;
+
+/// Pairs of segments of any features that cross by more than 1e-6 m.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Crossings {
+    /// In the reference.
+    pub before: usize,
+    /// In the marked map.
+    pub after: usize,
+    /// Pairs that did not cross before, by no distance.
+    pub new: usize,
+    /// Pairs that cross no longer, by no distance.
+    pub lost: usize,
+}
 
 /// Counts pairs of segments that cross before and after, and says where one of the two did not or does no longer.
 pub(super) fn crossings(

@@ -7,10 +7,11 @@ mod crossings;
 pub mod detail;
 mod text;
 
+pub use crossings::Crossings;
+
 use crate::{Error, Result, inputs::maps};
 use detail::{Detail, Findings};
 use meshmark_core::{
-    counted,
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
     map::Map,
     scale::Measure,
@@ -59,19 +60,6 @@ pub struct Compared {
     pub torn_vertices: usize,
 }
 
-/// Pairs of segments of any features that cross by more than 1e-6 m.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Crossings {
-    /// In the reference.
-    pub before: usize,
-    /// In the marked map.
-    pub after: usize,
-    /// Pairs that did not cross before, by no distance.
-    pub new: usize,
-    /// Pairs that cross no longer, by no distance.
-    pub lost: usize,
-}
-
 /// Further away than marks move anything, numbers of different CRS are of different places.
 const MOST_AWAY_M: f64 = 100.0;
 
@@ -105,12 +93,7 @@ pub fn compare(
     let (before, own) = maps::geometries("reference", reference, layers)?;
     let (after, other) = maps::geometries("marked map", marked, layers)?;
     if before.len() != after.len() {
-        let (b, a) = (before.len(), after.len());
-        return Err(Error::Usage(format!(
-            "the reference has {} and the marked map {a}: compare a map with the copy that was marked \
-             from it, before anything is removed",
-            counted(b, "geometry")
-        )));
+        return Err(Error::OtherCount { reference: before.len(), marked: after.len() });
     }
     let places = before.iter().zip(&after).find_map(|(a, b)| a.outline.first().zip(b.outline.first()));
     let away_m = places
@@ -118,11 +101,8 @@ pub fn compare(
     if let (Some(own), Some(other), true) = (own, other, away_m > MOST_AWAY_M)
         && !own.is_same(&other)
     {
-        let (marked, [own, other]) = (marked.display(), own.names_apart(&other));
-        return Err(Error::Usage(format!(
-            "the marked map {marked} is in {other} and the reference in {own}: compare the copy that was marked, before it \
-             is brought into another CRS"
-        )));
+        let [own, other] = own.names_apart(&other);
+        return Err(Error::OtherCrs { path: marked.into(), own, other });
     }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
     Ok(Pairs { features, measure, grid: precision.unwrap_or(0.0) }.compare(detailed))
@@ -132,11 +112,7 @@ fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
     let counts = |feature: &FeatureGeometry| feature.outline.chains.iter().map(Vec::len).collect::<Vec<_>>();
     if before.layer != after.layer || counts(&before) != counts(&after) {
         let fid = before.fid.map_or("without id".into(), |fid| fid.to_string());
-        return Err(Error::Usage(format!(
-            "layer \"{}\", feature {fid} of the reference does not have the vertices of its counterpart in the marked \
-             map (layer \"{}\"): features correspond by their order",
-            before.layer, after.layer
-        )));
+        return Err(Error::OtherVertices { layer: before.layer, fid, other: after.layer });
     }
     Ok(Pair { before: before.outline, after: after.outline })
 }

@@ -48,9 +48,7 @@ impl Copy {
     /// Whether file and record are there already, the record being that of this marking. Only then may anything be
     /// where the copy goes.
     pub fn is_finished(&self, options: &Options, key: &SecretKey, reference: &Reference) -> Result<bool> {
-        let remedy = "move it away, or give another --output-dir";
-        let refused =
-            |path: &Path, why: &str| Err(Error::Usage(format!("{} {why}: {remedy}", path.display())));
+        let refused = |path: &Path, why| Err(Error::InTheWay { path: path.into(), why });
         let has_record = self.record.symlink_metadata().is_ok();
         if has_record && !self.is_record_of_this(options, key, reference) {
             return refused(&self.record, "is not the record of this map, key, recipient and options");

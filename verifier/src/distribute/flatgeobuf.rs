@@ -3,7 +3,6 @@
 //! A file is a header, an index and the features, each of header and features a FlatBuffer with its size before it
 //! (flatgeobuf.org/src/fbs). The index is a packed R-tree: nodes of a box and a place, level by level, the root first.
 
-use super::plain::changed;
 use crate::{Error, Result, inputs::gdal_failures};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_dataset::{marking::Moves, workplace::file_error};
@@ -36,39 +35,34 @@ const NOTHING: Bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::N
 /// Writes a copy of `plain` in which the vertices are where they go.
 pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
     let mut bytes = fs::read(plain).map_err(|error| file_error("reading", plain, error))?;
-    let parts = Parts::of(&bytes).ok_or_else(strange)?;
+    let parts = Parts::of(&bytes).ok_or(Error::UnknownFlatGeobuf)?;
     let mut places = Vec::new();
     let mut at = parts.features.start;
     while at < parts.features.end {
-        let feature = root(&bytes, at).ok_or_else(strange)?;
+        let feature = root(&bytes, at).ok_or(Error::UnknownFlatGeobuf)?;
         let geometry = indirect_field(&bytes, feature, field::FEATURE_GEOMETRY);
         geometry
             .map_or(Some(()), |geometry| coordinates(&bytes, geometry, 0, &mut places))
-            .ok_or_else(strange)?;
-        at += 4 + u32_at(&bytes, at).ok_or_else(strange)? as usize;
+            .ok_or(Error::UnknownFlatGeobuf)?;
+        at += 4 + u32_at(&bytes, at).ok_or(Error::UnknownFlatGeobuf)? as usize;
     }
     for place in places {
         let point = [place, place + 8].map(|at| f64_at(&bytes, at).unwrap_or(f64::NAN));
-        let [x, y] = moves.destination(point).ok_or_else(changed)?;
+        let [x, y] = moves.destination(point).ok_or(Error::MapChanged)?;
         put(&mut bytes, place, &[x, y]);
     }
     fs::write(file, &bytes).map_err(|error| file_error("writing", file, error))?;
     let boxes = boxes(file)?;
-    parts.fit(&mut bytes, &boxes).ok_or_else(strange)?;
+    parts.fit(&mut bytes, &boxes).ok_or(Error::UnknownFlatGeobuf)?;
     Ok(fs::write(file, &bytes).map_err(|error| file_error("writing", file, error))?)
-}
-
-fn strange() -> Error {
-    Error::Usage(
-        "this GDAL writes FlatGeobuf as no other that was seen: write GPKG, and convert the copies".into(),
-    )
 }
 
 /// The boxes of all features in the order of the file. GDAL knows how far an arc reaches.
 fn boxes(file: &Path) -> Result<Vec<Bounds>> {
     gdal_failures::forget_failure();
     let failed = |error: gdal::errors::GdalError| {
-        Error::Usage(gdal_failures::last_failure().unwrap_or_else(|| error.to_string()))
+        let reason = gdal_failures::last_failure().unwrap_or_else(|| error.to_string());
+        Error::NotWritten { what: "FlatGeobuf".into(), reason }
     };
     let dataset = Dataset::open(file).map_err(failed)?;
     let mut layer = dataset.layer(0).map_err(failed)?;

@@ -1,7 +1,6 @@
 //! GeoJSON as GDAL writes it, a feature a line: the lines of one file with the positions of another.
 
-use super::plain::changed;
-use crate::Result;
+use crate::{Error, Result};
 use meshmark_dataset::{
     geojson_text::{Place, numbers, places},
     workplace::file_error,
@@ -23,7 +22,7 @@ pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
     let (plain, marked) = (open(plain)?, open(marked)?);
     let written = File::create(file).and_then(|to| join(plain, marked, BufWriter::new(to)));
     match written {
-        Err(error) if error.kind() == ErrorKind::InvalidData => Err(changed()),
+        Err(error) if error.kind() == ErrorKind::InvalidData => Err(Error::MapChanged),
         Err(error) => Err(file_error("writing", file, error).into()),
         Ok(()) => Ok(()),
     }

@@ -15,20 +15,17 @@ mod moving;
 mod ogr2ogr;
 mod plain;
 mod recipients;
+mod request;
 mod spatial_index;
 mod staged;
 mod staging;
 mod writing;
 
+pub use request::Request;
+
 use crate::{Error, Result, inputs::maps, progress::Progress};
 use copies::Copy;
-use meshmark_core::{
-    embedding::Embedding,
-    key::{RECIPIENT_BITS, SecretKey},
-    options::{Options, Spelling},
-    record::Reference,
-    vertices::VertexTable,
-};
+use meshmark_core::{embedding::Embedding, key::RECIPIENT_BITS, options::Spelling};
 use meshmark_dataset::{
     Survey, ThreadPool,
     formats::Format,
@@ -38,31 +35,15 @@ use meshmark_dataset::{
 };
 use staging::Stage;
 use std::{
-    collections::BTreeSet,
     fs,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{
         Mutex,
         atomic::{AtomicBool, Ordering},
     },
     thread,
 };
-
-/// What to distribute, to whom, and how it is marked.
-pub struct Request {
-    /// The key.
-    pub key: SecretKey,
-    /// The marking options, without a subject.
-    pub options: Options,
-    /// The map.
-    pub map: PathBuf,
-    /// The list of recipients.
-    pub recipients: PathBuf,
-    /// Where the copies go.
-    pub folder: PathBuf,
-    /// GDAL's short name of their format.
-    pub format: String,
-}
+use writing::Job;
 
 /// What was done.
 pub struct Summary {
@@ -70,20 +51,6 @@ pub struct Summary {
     pub written: usize,
     /// Copies that were there.
     pub finished_before: usize,
-}
-
-/// What all copies are made of.
-struct Job<'a> {
-    key: &'a SecretKey,
-    options: &'a Options,
-    vertices: &'a VertexTable,
-    unmarked: Unmarked<'a>,
-    reference: Reference,
-    format: &'static Format,
-    stage: &'a Stage,
-    folder: &'a Path,
-    /// What was said while copies were written, each once.
-    warnings: Mutex<BTreeSet<String>>,
 }
 
 /// Writes a marked copy and its record for every recipient who has none yet. `warn` hears of what is legal and
@@ -121,10 +88,9 @@ pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnM
 /// Makes the folder of the copies; whether it was not there.
 fn make_folder(folder: &Path) -> Result<bool> {
     let is_there = folder.is_dir();
-    fs::create_dir_all(folder).map(|()| !is_there).map_err(|error| {
-        let folder = folder.display();
-        Error::Usage(format!("the output folder {folder} cannot be made ({error}): name one that can be"))
-    })
+    fs::create_dir_all(folder)
+        .map(|()| !is_there)
+        .map_err(|error| Error::NoFolder { path: folder.into(), source: error })
 }
 
 /// Marks and writes, batch by batch.
@@ -144,7 +110,7 @@ fn run(
     marking::check_scale(&map, survey.crs.as_ref()).map_err(of_map)?;
     let threads = threads();
     let pool = ThreadPool::new(threads, || (), || ());
-    let pool = pool.map_err(|error| Error::Usage(format!("no threads can be started ({error})")))?;
+    let pool = pool.map_err(|error| Error::Threads { reason: error.to_string() })?;
     progress.start("patches", 0);
     let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
     let message = copies[0].carried(key);
@@ -173,18 +139,14 @@ fn run(
                     let distortion = pool.install(|| job.unmarked.distortion(&marked, parameters));
                     writing::write(&job, copy, &marked.coords, distortion)
                 });
-                written.map(|()| step(1)).map_err(|error| error.of(&copy.recipient))
+                written.map(|()| step(1)).map_err(|error| Error::Copy {
+                    recipient: copy.recipient.clone(),
+                    source: Box::new(error),
+                })
             })
         };
         written += in_parallel(threads.min(batch.len()), write_next).map_err(|(done, error)| {
-            let (done, all) = (written + done, copies.len());
-            error.with(&format!(
-                "; {done} of {} written, and the same command again makes the rest",
-                match all {
-                    1 => "1 copy was".into(),
-                    _ => format!("{all} copies were"),
-                }
-            ))
+            Error::Stopped { source: Box::new(error), done: written + done, all: copies.len() }
         })?;
     }
     job.warnings.into_inner().expect("nobody panics with them").iter().for_each(|text| warn(text));

@@ -33,7 +33,7 @@ pub fn write(staged: &Staged, path: &Path, to: &[[f64; 2]]) -> Result<()> {
         connection.execute_batch("COMMIT")?;
         connection.close().map_err(|(_, error)| error.into())
     };
-    moved().map_err(|error| Error::Usage(format!("writing failed: {error}")))
+    moved().map_err(|error| Error::NotWritten { what: "a copy".into(), reason: error.to_string() })
 }
 
 /// The bounding boxes of the features that have one, ascending by their ids.

@@ -20,9 +20,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
         .arg(named(from))
         .stdin(Stdio::null());
     command.env("OGR2OGR_USE_ARROW_API", "NO"); // which rounds what a column FLOAT holds to 32 bits
-    let output = command.output().map_err(|error| {
-        Error::Usage(format!("ogr2ogr cannot be run ({error}): install GDAL's programs (package gdal-bin)"))
-    })?;
+    let output = command.output().map_err(|error| Error::NoOgr2ogr { source: error })?;
     let text = String::from_utf8_lossy(&output.stderr);
     let said = |kind: &str| -> Vec<String> {
         let lines = text.lines().filter_map(|line| line.strip_prefix(kind)?.split_once(": "));
@@ -38,7 +36,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
             .collect());
     }
     let reason = errors.into_iter().next().unwrap_or_else(|| output.status.to_string());
-    Err(Error::Unreadable(format!("ogr2ogr cannot copy {} to {format}: {reason}", from.display())))
+    Err(Error::Ogr2ogr { path: from.into(), format: format.into(), reason })
 }
 
 /// The first of all texts that differ in numbers alone, such as those of features, and how many more there are.

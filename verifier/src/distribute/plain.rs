@@ -59,7 +59,7 @@ impl Plain {
                 .map_err(|error| file_error("reading", &path, error))
         };
         if size(&self.path)? != size(geometries)? {
-            return Err(changed());
+            return Err(Error::MapChanged);
         }
         let folder = self.path.parent().expect("it is in a folder");
         let entries = fs::read_dir(folder).map_err(|error| file_error("reading", folder, error))?;
@@ -75,13 +75,4 @@ impl Plain {
         }
         Ok(())
     }
-}
-
-/// The plain copy and the geometries do not belong together.
-pub fn changed() -> Error {
-    Error::Unreadable(
-        "the map was changed while it was read, or ogr2ogr reads other features of it: convert it to a GeoPackage, and \
-         distribute that"
-            .into(),
-    )
 }

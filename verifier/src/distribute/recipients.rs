@@ -37,7 +37,7 @@ const LONGEST_LIST: u64 = 64 << 20;
 /// Reads the recipients in their order, each once, without blank lines; `warn` hears of those given again.
 pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     let name = path.display();
-    let bad = |what: String| Error::Usage(format!("the list of recipients {name} {what}"));
+    let bad = |reason: String| Error::Recipients { path: path.into(), reason };
     let mut bytes = Vec::new();
     let file = File::open(path).and_then(|file| file.take(LONGEST_LIST + 1).read_to_end(&mut bytes));
     file.map_err(|error| bad(format!("cannot be read: {error}")))?;

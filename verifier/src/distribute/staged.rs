@@ -48,7 +48,7 @@ impl Staged {
         };
         match clear_native_data(&path).and_then(|()| layers()) {
             Ok(layers) => Ok(Staged { layers, path }),
-            Err(error) => Err(Error::Unreadable(format!("the map as a GeoPackage cannot be read: {error}"))),
+            Err(error) => Err(Error::StagedUnread { reason: error.to_string() }),
         }
     }
 

@@ -1,16 +1,11 @@
 //! What all copies are made of: the map as `ogr2ogr` copies it, and a GeoPackage whose geometries move.
 
-use super::{
-    Request, ogr2ogr,
-    plain::{Plain, changed},
-    staged::Staged,
-};
+use super::{ogr2ogr, plain::Plain, request::Request, staged::Staged};
 use crate::{Error, Result, inputs::maps};
 use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Layer, LayerAccess, LayerOptions},
 };
-use meshmark_core::options::Spelling;
 use meshmark_dataset::{Error as MapError, Survey, formats::Format, parse_srs, workplace::Workplace};
 use std::path::Path;
 
@@ -47,15 +42,16 @@ impl Stage {
         } else {
             let plain = Plain::new(&request.map, &workplace.subfolder("plain")?, format, warn)?;
             let failed = |error| maps::failed("map", &request.map, error);
-            copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path)
-                .map_err(|error| Error::Usage(format!("writing {} failed: {error}", path.display())))?;
+            copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path).map_err(
+                |error| Error::NotWritten { what: path.display().to_string(), reason: error.to_string() },
+            )?;
             (Staged::read(path, &map.data.vertices, |_| true)?, Some(plain))
         };
         let geometries = map.geometries.as_ref().expect("the map was read with them");
         let staged_geometries: usize = staged.layers.iter().map(|layer| layer.fids.len()).sum();
         match staged_geometries == geometries.len() {
             true => Ok(Stage { staged, plain, layers }),
-            false => Err(changed()),
+            false => Err(Error::MapChanged),
         }
     }
 }
@@ -63,9 +59,7 @@ impl Stage {
 /// Refuses what the format would hold otherwise.
 fn check_fits(request: &Request, format: &'static Format, map: &Survey, layers: &[String]) -> Result<()> {
     let driver = format.driver;
-    let refused = |error: MapError| {
-        Err(Error::Usage(format!("the map {}: {}", request.map.display(), error.text(Spelling::Flag))))
-    };
+    let refused = |error: MapError| Err(Error::Refused { path: request.map.clone(), source: error });
     if layers.len() > 1 && !format.many_layers {
         return refused(MapError::OneLayer { driver });
     }

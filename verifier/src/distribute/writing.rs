@@ -1,21 +1,40 @@
 //! A copy: written, read back, published.
 
-use super::{Job, copies::Copy, moving};
+use super::{copies::Copy, moving, staging::Stage};
 use crate::{
     Error, Result,
     inputs::gdal_failures::{forget_failure, last_failure},
 };
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
-use meshmark_core::record::Distortion;
+use meshmark_core::{
+    key::SecretKey,
+    options::Options,
+    record::{Distortion, Reference},
+    vertices::VertexTable,
+};
 use meshmark_dataset::{
     Error as MapError,
     formats::Format,
-    marking::{self, Moves},
+    marking::{self, Moves, Unmarked},
     publication::{Move, Publication},
     read_back::ReadBack,
     workplace::{Workplace, file_error},
 };
-use std::{ffi::OsStr, fs, path::Path};
+use std::{collections::BTreeSet, ffi::OsStr, fs, path::Path, sync::Mutex};
+
+/// What all copies are made of.
+pub struct Job<'a> {
+    pub key: &'a SecretKey,
+    pub options: &'a Options,
+    pub vertices: &'a VertexTable,
+    pub unmarked: Unmarked<'a>,
+    pub reference: Reference,
+    pub format: &'static Format,
+    pub stage: &'a Stage,
+    pub folder: &'a Path,
+    /// What was said while copies were written, each once.
+    pub warnings: Mutex<BTreeSet<String>>,
+}
 
 /// Writes, checks and publishes a copy and its record.
 pub fn write(job: &Job, copy: &Copy, moved: &[[f64; 2]], distortion: Distortion) -> Result<()> {
@@ -99,6 +118,6 @@ fn open(path: &Path, driver: &str) -> Result<Dataset> {
     forget_failure();
     Dataset::open_ex(path, options).map_err(|error| {
         let reason = last_failure().unwrap_or_else(|| error.to_string());
-        Error::Usage(format!("opening {} failed: {reason}", path.display()))
+        Error::NotWritten { what: path.display().to_string(), reason }
     })
 }

@@ -1,6 +1,9 @@
 //! Histograms.
 
-use super::{count, figure, frame::rounded, section};
+use super::{
+    frame::rounded,
+    page::{count, figure, section},
+};
 use crate::report::Report;
 use maud::{Markup, html};
 use meshmark_detection::{Histogram, round_up};

@@ -1,6 +1,9 @@
 //! What was compared, with what identifies it, and the records that were tried.
 
-use super::{count, section, table, words};
+use super::{
+    page::{count, section, sentence, table},
+    words,
+};
 use crate::{
     inputs::digests::Digested,
     report::{Candidates, Provenance, Report, explain},
@@ -13,7 +16,7 @@ use meshmark_detection::decision::Verdict;
 pub fn compared(report: &Report) -> Markup {
     let content = html! {
         @if let Some(provenance) = &report.provenance { (files(report, provenance)) }
-        p { @for text in explain::bound(report) { (super::sentence(&text)) } }
+        p { @for text in explain::bound(report) { (sentence(&text)) } }
         @if let Some(candidates) = &report.candidates { (tried(report, candidates)) }
     };
     section("What was compared", &content)

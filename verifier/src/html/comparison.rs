@@ -2,10 +2,9 @@
 
 use super::{
     chart::Chart,
-    count, counted, figure,
     frame::Frame,
     map::{Arrows, marks},
-    page, section, table,
+    page::{count, counted, figure, page, section, table},
 };
 use crate::compare::{
     Comparison,

@@ -1,6 +1,6 @@
 //! What the finding does not say, what would weaken it, what makes it evidence, and how to repeat it.
 
-use super::{count, counted, section};
+use super::page::{count, counted, section};
 use crate::report::{Report, explain};
 use maud::{Markup, html};
 use meshmark_detection::decision::Verdict;

@@ -1,9 +1,8 @@
 //! Where on the map the evidence is: patches by their own evidence, vertices and how far they moved.
 
 use super::{
-    count, figure,
     frame::{Frame, largest_below, metres},
-    section,
+    page::{count, figure, section},
 };
 use crate::report::{Evidence, Report, sketch::PatchPlace};
 use maud::{Markup, html};

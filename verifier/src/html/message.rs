@@ -1,6 +1,6 @@
 //! The message bit by bit, with how sure each bit is.
 
-use super::{count, figure, section, sentence};
+use super::page::{count, figure, section, sentence};
 use crate::report::{Report, text::certainty};
 use maud::{Markup, html};
 

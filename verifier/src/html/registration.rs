@@ -1,6 +1,9 @@
 //! How the suspect was brought onto the reference, and what was left.
 
-use super::{chart::Chart, count, figure, section, sentence, table};
+use super::{
+    chart::Chart,
+    page::{count, figure, section, sentence, table},
+};
 use crate::report::{Evidence, Report, explain};
 use maud::{Markup, html};
 use meshmark_detection::decision::Verdict;

@@ -1,6 +1,6 @@
 //! The verdict in one sentence, and the figures behind it.
 
-use super::{count, words};
+use super::{page::count, words};
 use crate::{
     report::Report,
     words::{clipped, printable},

@@ -1,6 +1,6 @@
 //! Probabilities as people say them.
 
-use super::count;
+use super::page::count;
 use maud::{Markup, html};
 
 /// How often chance does as well, in words and number, to end a sentence with: "in about 43 of 100 tries".

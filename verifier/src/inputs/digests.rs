@@ -56,9 +56,7 @@ impl Inputs {
 /// SHA-256 of a file; of a folder, or a file with companions of the same name, that of the sorted list of
 /// their digests as `sha256sum` prints it.
 pub(crate) fn digest(path: &Path) -> Result<Digested> {
-    let failed = |error: io::Error| {
-        Error::Unreadable(format!("{} cannot be read to its end: {error}", path.display()))
-    };
+    let failed = |error: io::Error| Error::Undigested { path: path.into(), source: error };
     let shown = printable(&path.display().to_string());
     let files = files_of(path).map_err(failed)?;
     let digest = match files.as_slice() {

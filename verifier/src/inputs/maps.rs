@@ -3,11 +3,7 @@
 use super::gdal_failures::{forget_failure, last_failure};
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
-use meshmark_core::{
-    ground::Ground,
-    options::{Options, Spelling},
-    scale::ScaleLattice,
-};
+use meshmark_core::{ground::Ground, options::Options, scale::ScaleLattice};
 use meshmark_dataset::{
     CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, features,
     marked_view, marking, survey,
@@ -42,10 +38,7 @@ pub(crate) fn source(
     warn: &mut dyn FnMut(&str),
 ) -> Result<(Dataset, Survey)> {
     if marked_view::is_named_by(path) {
-        let path = path.display();
-        return Err(Error::Usage(format!(
-            "the map {path} is a marked view already: name the dataset itself"
-        )));
+        return Err(Error::MarkedView { path: path.into() });
     }
     let dataset = open("map", path, None)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
@@ -57,14 +50,17 @@ pub(crate) fn source(
 
 /// The geometries of a map in order, for a comparison, and the first CRS of a layer.
 pub fn geometries(
-    what: &str,
+    what: &'static str,
     path: &Path,
     layers: Option<&[String]>,
 ) -> Result<(Vec<FeatureGeometry>, Option<CoordinateSystem>)> {
     let dataset = open(what, path, None)?;
     forget_failure();
     let found = features(&dataset, layers, &last_failure);
-    Ok((found.map_err(|error| of_map(what, path, &error))?, first_crs(&dataset)))
+    Ok((
+        found.map_err(|error| Error::Unmeasured { what: what, path: path.into(), source: error })?,
+        first_crs(&dataset),
+    ))
 }
 
 pub(super) fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
@@ -75,11 +71,11 @@ pub(super) fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
 pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<ScaleLattice>)> {
     let survey =
         reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
-    survey.into_scales().map_err(|error| of_map("reference", path, &error))
-}
-
-fn of_map(what: &str, path: &Path, error: &meshmark_dataset::Error) -> Error {
-    Error::Unreadable(format!("the {what} {}: {error}", path.display()))
+    survey.into_scales().map_err(|error| Error::Unmeasured {
+        what: "reference",
+        path: path.into(),
+        source: error,
+    })
 }
 
 /// A misspelt field would leave no landmark, and nobody would know why.
@@ -89,16 +85,12 @@ fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> 
     let unknown = names.iter().find(|name| !known.iter().any(|field| field.eq_ignore_ascii_case(name)));
     let Some(name) = unknown else { return Ok(()) };
     let known = known.into_iter().collect::<Vec<_>>().join(", ");
-    let path = path.display();
-    Err(Error::Usage(format!("the reference {path} has no field \"{name}\": --landmark may name {known}")))
+    Err(Error::UnknownField { path: path.into(), field: name.clone(), known })
 }
 
-pub(super) fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {
+pub(super) fn open(what: &'static str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {
     if holds_password(path) {
-        return Err(Error::Usage(format!(
-            "the {what} is a connection with a password in it, which reports and messages would repeat: give the \
-             password by a PGPASSFILE or service file, or an environment variable of the database's driver"
-        )));
+        return Err(Error::Password { what });
     }
     forget_failure();
     let mut open_options = marking::OPEN_OPTIONS.to_vec();
@@ -113,7 +105,7 @@ pub(super) fn open(what: &str, path: &Path, allowed_drivers: Option<&[&str]>) ->
         let reason = last_failure().unwrap_or_else(|| error.to_string());
         let formats =
             allowed_drivers.map_or(String::new(), |d| format!(" (a suspect may be {})", d.join(", ")));
-        Error::Unreadable(format!("the {what} {} cannot be opened: {reason}{formats}", path.display()))
+        Error::Unopened { what, path: path.into(), reason, formats }
     })
 }
 
@@ -129,7 +121,7 @@ fn holds_password(path: &Path) -> bool {
 }
 
 pub(super) fn read(
-    what: &str,
+    what: &'static str,
     path: &Path,
     dataset: &Dataset,
     reading: &Reading,
@@ -156,13 +148,6 @@ pub(super) fn survey_of(
     survey(dataset, &selection)
 }
 
-pub(crate) fn failed(what: &str, path: &Path, error: meshmark_dataset::Error) -> Error {
-    let text = format!("the {what} {}: {}", path.display(), error.text(Spelling::Flag));
-    match error {
-        meshmark_dataset::Error::TooLarge { .. } => Error::TooLarge(text),
-        meshmark_dataset::Error::UnknownLayer { .. }
-        | meshmark_dataset::Error::UnknownSrs(_)
-        | meshmark_dataset::Error::ContradictingSrs { .. } => Error::Usage(text),
-        _ => Error::Unreadable(text),
-    }
+pub(crate) fn failed(what: &'static str, path: &Path, source: meshmark_dataset::Error) -> Error {
+    Error::Map { what, path: path.into(), source }
 }

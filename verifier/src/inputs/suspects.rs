@@ -64,10 +64,9 @@ pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
 
 fn open_suspect(path: &Path) -> Result<Dataset> {
     if !path.is_file() && !path.is_dir() {
-        let path = path.display();
-        return Err(Error::Unreadable(format!("the suspect {path} is not a file here: give a local file")));
+        return Err(Error::NoFile { path: path.into() });
     }
-    forbid_network().map_err(|error| Error::Unreadable(format!("GDAL takes no option: {error}")))?;
+    forbid_network().map_err(|error| Error::NoOption { reason: error.to_string() })?;
     check_table(path)?;
     let dataset = open("suspect", path, Some(SUSPECT_DRIVERS))?;
     check_plain(path, &dataset)?;
@@ -104,10 +103,7 @@ fn check_table(path: &Path) -> Result<()> {
         let text = String::from_utf8_lossy(&bytes).to_lowercase();
         let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
         if seamless || text.contains("create view") {
-            return Err(Error::Unreadable(format!(
-                "the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr",
-                table.display()
-            )));
+            return Err(Error::OtherTables { path: table.clone() });
         }
     }
     Ok(())
@@ -131,9 +127,8 @@ fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
     if !matches!(dataset.driver().short_name().as_str(), "GPKG" | "SQLite") {
         return Ok(());
     }
-    let failed = |error: gdal::errors::GdalError| {
-        Error::Unreadable(format!("the suspect {} cannot be read: {error}", path.display()))
-    };
+    let failed =
+        |error: gdal::errors::GdalError| Error::Unread { path: path.into(), reason: error.to_string() };
     // A forged schema may have any type, page and spacing; its text is what SQLite goes by.
     let query = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
     let tables = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT).map_err(failed)?;
@@ -141,12 +136,7 @@ fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
     for table in tables.features() {
         let text = |field: usize| table.field_as_string(field).ok().flatten().unwrap_or_default();
         if !is_plain(&text(1)) {
-            return Err(Error::Unreadable(format!(
-                "the suspect {} has a virtual table \"{}\", which may point at other files: copy its layers to \
-                 a plain file, for example with ogr2ogr",
-                path.display(),
-                text(0).escape_debug()
-            )));
+            return Err(Error::VirtualTable { path: path.into(), table: text(0).escape_debug().to_string() });
         }
     }
     Ok(())

@@ -10,18 +10,32 @@ use zeroize::Zeroizing;
 
 /// Reads a key file.
 pub fn key(path: &Path) -> Result<SecretKey> {
-    let text = text("key", path)?;
-    SecretKey::from_json(&text).map_err(|error| Error::Usage(format!("{}: {error}", path.display())))
+    let text = text(path).map_err(|source| Error::TextUnread { what: "key", path: path.into(), source })?;
+    SecretKey::from_json(&text).map_err(|source| Error::Malformed { path: path.into(), source })
 }
 
 /// Reads a record.
 pub fn record(path: &Path) -> Result<Record> {
-    Record::from_json(&text("record", path)?)
-        .map_err(|error| Error::Usage(format!("{}: {error}", path.display())))
+    parsed_record(path).map_err(|bad| match bad {
+        BadRecord::Unread(source) => Error::TextUnread { what: "record", path: path.into(), source },
+        BadRecord::Malformed(source) => Error::Malformed { path: path.into(), source },
+    })
 }
 
-fn text(what: &str, path: &Path) -> Result<Zeroizing<String>> {
-    let unreadable =
-        |error: io::Error| Error::Usage(format!("the {what} {} cannot be read: {error}", path.display()));
-    File::open(path).and_then(read_text).map_err(unreadable)
+/// Why a file is no record.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BadRecord {
+    #[error("it cannot be read: {0}")]
+    Unread(io::Error),
+    #[error("{0}")]
+    Malformed(meshmark_core::Error),
+}
+
+/// Reads a record of many, whose name the caller knows.
+pub(crate) fn parsed_record(path: &Path) -> std::result::Result<Record, BadRecord> {
+    Record::from_json(&text(path).map_err(BadRecord::Unread)?).map_err(BadRecord::Malformed)
+}
+
+fn text(path: &Path) -> io::Result<Zeroizing<String>> {
+    File::open(path).and_then(read_text)
 }

@@ -196,7 +196,7 @@ impl EvidenceMapFile {
     pub fn new(path: &Path) -> Result<Self> {
         let folder = folder_of(path);
         if !folder.is_dir() {
-            return Err(unwritable(path, "its folder does not exist"));
+            return Err(Error::NoFolderFor { path: path.into() });
         }
         workplace(path)?;
         let target = EvidenceMapFile { path: path.into() };
@@ -204,7 +204,7 @@ impl EvidenceMapFile {
     }
 
     fn exists(&self) -> Error {
-        Error::Usage(format!("{} exists: name another file for --evidence-map", self.path.display()))
+        Error::Exists { path: self.path.clone(), remedy: ": name another file for --evidence-map" }
     }
 
     fn failed(&self, reason: &str) -> Error {
@@ -219,7 +219,7 @@ fn workplace(path: &Path) -> Result<TempDir> {
 }
 
 fn unwritable(path: &Path, reason: &str) -> Error {
-    Error::Usage(format!("{} cannot be written: {reason}", path.display()))
+    Error::NotWritten { what: path.display().to_string(), reason: reason.into() }
 }
 
 #[cfg(test)]

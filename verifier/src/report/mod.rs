@@ -14,7 +14,7 @@ pub use evidence_map::{EvidenceMap, EvidenceMapFile};
 pub use explain::explain;
 pub use report_file::{Format, ReportFile};
 
-use crate::error::ExitCode;
+use crate::ExitCode;
 use meshmark_core::{
     code::{Code, Decoder},
     options::{Laplacian, Rigidity},

@@ -29,7 +29,7 @@ impl ReportFile {
     /// # Errors
     /// Another extension than html and json, a file that exists, a folder that does not or that may not be written to.
     pub fn new(path: &Path) -> Result<Self> {
-        let refused = |reason: &str| Err(Error::Usage(format!("the report {} {reason}", path.display())));
+        let refused = |reason: &str| Err(Error::ReportName { path: path.into(), reason: reason.into() });
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         let format = match extension.as_deref() {
             Some("html" | "htm") => Format::Html,
@@ -63,7 +63,7 @@ impl ReportFile {
     /// # Errors
     /// The disk, the permissions of the folder, or a file that came into being meanwhile.
     pub fn write(&self, text: &str) -> Result<()> {
-        let failed = |error| self.failed(&error);
+        let failed = |error| self.failed(error);
         let mut file = self.temporary()?;
         file.write_all(text.as_bytes()).map_err(|error| failed(without_path(error)))?;
         file.as_file().sync_all().map_err(failed)?;
@@ -76,10 +76,10 @@ impl ReportFile {
         options.prefix(".meshmark-report-");
         #[cfg(unix)] // less the process's umask, as for any file
         options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        options.tempfile_in(folder_of(&self.path)).map_err(|error| self.failed(&without_path(error)))
+        options.tempfile_in(folder_of(&self.path)).map_err(|error| self.failed(without_path(error)))
     }
 
-    fn failed(&self, error: &std::io::Error) -> Error {
+    fn failed(&self, error: std::io::Error) -> Error {
         let remedy = match error.kind() {
             ErrorKind::AlreadyExists => ", and a report is never overwritten: name another file",
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
@@ -87,7 +87,7 @@ impl ReportFile {
             }
             _ => ": name a file in a folder you may write to",
         };
-        Error::Usage(format!("the report {} cannot be written: {error}{remedy}", self.path.display()))
+        Error::Unwritten { what: format!("the report {}", self.path.display()), source: error, remedy }
     }
 }
 

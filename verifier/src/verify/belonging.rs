@@ -11,16 +11,10 @@ use meshmark_dataset::Survey;
 /// It is of another key, or was changed.
 pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
     if record.key_id != key.id() {
-        return Err(Error::DoesNotBelong(format!(
-            "the record was made with key {}, and this is key {}: give the key it was made with",
-            record.key_id,
-            key.id()
-        )));
+        return Err(Error::OtherKey { made_with: record.key_id.clone(), given: key.id() });
     }
     if record.subject()?.message(key) != record.message()? {
-        return Err(Error::DoesNotBelong(
-            "the record's message is not that of its recipient under this key: the record was changed".into(),
-        ));
+        return Err(Error::OtherMessage);
     }
     Ok(())
 }
@@ -33,11 +27,9 @@ pub fn check_reference(record: &Record, request: &Request, reference: &Survey, d
     if record.reference.vertices_sha256 == digest {
         return Ok(());
     }
-    Err(Error::DoesNotBelong(format!(
-        "the record was made from another reference ({} vertices) than {} ({} vertices): give the file that was \
-         marked, unchanged",
-        record.reference.vertices,
-        request.reference.display(),
-        reference.data.vertices.len()
-    )))
+    Err(Error::OtherReference {
+        path: request.reference.clone(),
+        recorded: record.reference.vertices,
+        vertices: reference.data.vertices.len(),
+    })
 }

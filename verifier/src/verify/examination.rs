@@ -5,7 +5,7 @@ use super::{
     request::Request,
 };
 use crate::{
-    Error, Result,
+    Error, ExitCode, Result,
     inputs::{maps, maps::Reading, suspects},
     progress::Progress,
     report::{
@@ -13,8 +13,8 @@ use crate::{
         sketch::{Scene, Sketch},
     },
 };
-use meshmark_core::{demodulation::Demodulation, options::Spelling};
-use meshmark_dataset::{LabelFields, Survey};
+use meshmark_core::demodulation::Demodulation;
+use meshmark_dataset::{Error as MapError, LabelFields, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Reference,
     decision::Decoys,
@@ -47,22 +47,49 @@ pub struct Examination {
 /// Reads the reference of a request.
 ///
 /// # Errors
-/// It cannot be read, or has not what the request names.
-pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Survey> {
+/// It cannot be read.
+pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Fit<Survey>> {
     progress.start("reading", 0);
     let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
-    maps::reference(
-        &request.reference,
-        &Reading { layers, srs, landmarks: request.landmarks(), geometries: false },
-    )
+    let reading = Reading { layers, srs, landmarks: request.landmarks(), geometries: false };
+    match maps::reference(&request.reference, &reading) {
+        Ok(reference) => Ok(Fit::Fits(reference)),
+        Err(error) if error.exit_code() == ExitCode::Usage => Ok(Fit::Unfit(error)),
+        Err(error) => Err(error),
+    }
+}
+
+/// What a reference is to a request.
+pub enum Fit<T> {
+    /// The mark of the request may be in a map made from it.
+    Fits(T),
+    /// The mark cannot have been made from it, and why.
+    Unfit(Error),
+}
+
+impl<T> Fit<T> {
+    /// For a request that names this very reference.
+    ///
+    /// # Errors
+    /// It does not fit.
+    pub fn or_fail(self) -> Result<T> {
+        match self {
+            Fit::Fits(found) => Ok(found),
+            Fit::Unfit(error) => Err(error),
+        }
+    }
 }
 
 /// Registers, matches and demodulates the suspect of a request.
 ///
 /// # Errors
-/// An unreadable suspect, parameters that do not fit the reference.
-pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Examination> {
-    let map = reference.map().map_err(|error| of_reference(request, error))?;
+/// An unreadable suspect.
+pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Fit<Examination>> {
+    let unfit = |source: MapError| Fit::Unfit(Error::Unfit { path: request.reference.clone(), source });
+    let map = match reference.map() {
+        Ok(map) => map,
+        Err(error) => return Ok(unfit(error)),
+    };
     progress.start("reading", 0);
     let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
     let suspect = suspects::suspect(&request.suspect, &plain, reference)?;
@@ -70,7 +97,10 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
 
     progress.start("patches", 0);
     let compared = Reference::new(&reference.data, &map, request.bits, &request.parameters);
-    let compared = compared.map_err(|error| of_reference(request, error))?; // before the map is searched for
+    let compared = match compared {
+        Ok(compared) => compared,
+        Err(error) => return Ok(unfit(error.into())), // before the map is searched for
+    };
 
     progress.start("registration", 0);
     let registrar = Registrar::new(&reference.data, &compared.ground, request.radius_m);
@@ -86,7 +116,10 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         false => {
             let found =
                 progress.listen(|listener| matched.demodulate(mark.0, mark.1, request.radius_m, listener));
-            Some(found.map_err(|error| of_reference(request, error))?)
+            match found {
+                Ok(found) => Some(found),
+                Err(error) => return Ok(unfit(error.into())),
+            }
         }
     };
     let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
@@ -102,7 +135,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),
         None => (Err(unregistered(&vertices, matched.by_chance, request.registration)), None),
     };
-    Ok(Examination {
+    Ok(Fit::Fits(Examination {
         registration,
         vertices,
         reference_digest: reference.data.vertices.digest(),
@@ -112,16 +145,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         decoys,
         sketch,
         evidence_map,
-    })
-}
-
-/// What does not fit the reference: its options are flags here.
-fn of_reference(request: &Request, error: impl Into<meshmark_dataset::Error>) -> Error {
-    Error::Usage(format!(
-        "the reference {}: {}",
-        request.reference.display(),
-        error.into().text(Spelling::Flag)
-    ))
+    }))
 }
 
 fn unregistered(vertices: &VertexCounts, chance: usize, start: Start) -> String {

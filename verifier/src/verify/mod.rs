@@ -15,7 +15,7 @@ mod records;
 mod request;
 
 pub use belonging::{check_key, check_reference};
-pub use examination::{Examination, examine, read_reference};
+pub use examination::{Examination, Fit, examine, read_reference};
 pub use records::verify_records;
 pub use request::Request;
 
@@ -29,11 +29,11 @@ use meshmark_detection::decision::{Decision, Expected, decide_among};
 /// # Errors
 /// Unreadable input, parameters that do not fit the reference, a record of another reference.
 pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
-    let reference = read_reference(request, progress)?;
+    let reference = read_reference(request, progress)?.or_fail()?;
     if let Some(record) = &request.record {
         check_reference(record, request, &reference, &reference.data.vertices.digest())?;
     }
-    let seen = examine(request, &reference, progress)?;
+    let seen = examine(request, &reference, progress)?.or_fail()?;
     let (subject, decision) = match &seen.found {
         Ok(found) => decide_subjects(request, found),
         Err(reason) => (request.subject.clone(), Decision::inconclusive(reason.clone())),

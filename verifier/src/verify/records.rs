@@ -6,7 +6,7 @@
 use super::{
     belonging::{check_key, check_reference},
     conclusion::conclude,
-    examination::{Examination, examine, read_reference},
+    examination::{Examination, Fit, examine, read_reference},
     request::Request,
 };
 use crate::{
@@ -77,10 +77,7 @@ pub fn verify_records(
     }
     let outcomes = decide_all(of_group, &examined, request.significance);
     let Some(best) = outcomes.first() else {
-        return Err(Error::Usage(format!(
-            "no file of {} is a record of this key and this reference: give the folder the records were written to",
-            folder.display()
-        )));
+        return Err(Error::NoRecord { folder: folder.into() });
     };
     let (template, seen) = &examined[best.group];
     let chosen = Request {
@@ -104,9 +101,7 @@ fn these_are(files: &[String]) -> String {
 
 /// Reads what can be read, in the order of file names.
 fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) -> Result<Vec<Candidate>> {
-    let unreadable = |error: std::io::Error| {
-        Error::Usage(format!("the folder {} cannot be read: {error}", folder.display()))
-    };
+    let unreadable = |error: std::io::Error| Error::FolderUnread { path: folder.into(), source: error };
     let mut files = Vec::new();
     for entry in folder.read_dir().map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
@@ -118,24 +113,22 @@ fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) 
     let mut candidates = Vec::new();
     for path in files {
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let checked = texts::record(&path).and_then(|record| {
-            check_key(&record, key)?;
-            let (subject, message) = (record.subject()?, record.message()?);
-            Ok((record, subject, message))
-        });
-        match checked {
-            Ok((record, subject, message)) => {
-                candidates.push(Candidate { file, record, subject, message });
-            }
-            Err(error) => skip(&file, without_name(&error, &path)),
+        match texts::parsed_record(&path) {
+            Err(bad) => skip(&file, bad.to_string()),
+            Ok(record) => match candidate(file.clone(), record, key) {
+                Ok(candidate) => candidates.push(candidate),
+                Err(other) => skip(&file, other.to_string()),
+            },
         }
     }
     Ok(candidates)
 }
 
-fn without_name(error: &Error, path: &Path) -> String {
-    let text = error.to_string();
-    text.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&text).into()
+/// The candidate of a record that belongs to the key.
+fn candidate(file: String, record: Record, key: &SecretKey) -> Result<Candidate> {
+    check_key(&record, key)?;
+    let (subject, message) = (record.subject()?, record.message()?);
+    Ok(Candidate { file, record, subject, message })
 }
 
 /// Puts records together that differ in their message alone.
@@ -165,8 +158,10 @@ fn examine_group(
     progress: &mut Progress,
     skip: &mut dyn FnMut(&str, String),
 ) -> Result<Option<(Group, Examination)>> {
-    let reference = read_reference(&group.request, progress);
-    let Some(reference) = or_skip(reference, &group, skip)? else { return Ok(None) };
+    let reference = match read_reference(&group.request, progress)? {
+        Fit::Fits(reference) => reference,
+        Fit::Unfit(error) => return Ok(skip_all(&group, &error, skip)),
+    };
     let digest = reference.data.vertices.digest();
     group.candidates.retain(|candidate| {
         let checked = check_reference(&candidate.record, &group.request, &reference, &digest);
@@ -178,20 +173,16 @@ fn examine_group(
     if group.candidates.is_empty() {
         return Ok(None);
     }
-    let seen = examine(&group.request, &reference, progress);
-    Ok(or_skip(seen, &group, skip)?.map(|seen| (group, seen)))
+    match examine(&group.request, &reference, progress)? {
+        Fit::Fits(seen) => Ok(Some((group, seen))),
+        Fit::Unfit(error) => Ok(skip_all(&group, &error, skip)),
+    }
 }
 
 /// What does not fit the reference is wrong in the records.
-fn or_skip<T>(result: Result<T>, group: &Group, skip: &mut dyn FnMut(&str, String)) -> Result<Option<T>> {
-    match result {
-        Ok(done) => Ok(Some(done)),
-        Err(Error::Usage(reason)) => {
-            group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.clone()));
-            Ok(None)
-        }
-        Err(other) => Err(other),
-    }
+fn skip_all<T>(group: &Group, error: &Error, skip: &mut dyn FnMut(&str, String)) -> Option<T> {
+    group.candidates.iter().for_each(|candidate| skip(&candidate.file, error.to_string()));
+    None
 }
 
 /// Decides on every candidate; the best comes first.

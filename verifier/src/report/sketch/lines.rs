@@ -1,6 +1,6 @@
 //! The segments of a map as few and short lines: what lies on one point of a page is drawn once.
 
-use super::Extent;
+use super::extent::Extent;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Segments of a drawing; twice as many would be no clearer on a page.

@@ -1,13 +1,15 @@
 //! What a report draws of a verification: a map that is thinned to what a page can show. No key is involved.
 
+mod extent;
 mod lines;
 mod thinning;
 
 use geo::{ConvexHull, MultiPoint};
-use meshmark_core::{ground::Ground, patches::Patch, vertices::VertexTable};
+use meshmark_core::patches::Patch;
 use meshmark_detection::{Demodulated, Histogram, Matched, matching::Matches, registration::Registration};
 use serde::Serialize;
 
+pub use extent::Extent;
 pub(crate) use lines::lines;
 pub(crate) use thinning::Thinning;
 
@@ -46,17 +48,6 @@ pub struct Sketch {
     /// Rings and lines of the reference, thinned, CRS units.
     #[serde(skip)]
     pub lines: Vec<Vec<[f64; 2]>>,
-}
-
-/// The rectangle of a map.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Extent {
-    /// Lower left corner, CRS units.
-    pub lower: [f64; 2],
-    /// Upper right corner, CRS units.
-    pub upper: [f64; 2],
-    /// Metres on the ground per CRS unit in its middle, of x and of y.
-    pub metres_per_unit: [f64; 2],
 }
 
 /// A patch on the map.
@@ -165,18 +156,6 @@ impl Scene<'_> {
             stretch: [squares + root, squares - root].map(|s| (s.max(0.0) / 2.0).sqrt()),
             mirrored: determinant < 0.0,
         }
-    }
-}
-
-impl Extent {
-    pub(crate) fn of(vertices: &VertexTable, ground: &Ground) -> Self {
-        let (lower, upper) = vertices.bounds();
-        Extent { lower, upper, metres_per_unit: ground.metres_per_unit(vertices.centre()) }
-    }
-
-    /// Width and height on the ground, metres.
-    pub(crate) fn size_m(&self) -> [f64; 2] {
-        [0, 1].map(|axis| (self.upper[axis] - self.lower[axis]) * self.metres_per_unit[axis])
     }
 }
 

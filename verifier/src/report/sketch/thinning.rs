@@ -1,6 +1,6 @@
 //! One point for every cell of a grid: a map of a million vertices becomes one that a page can show.
 
-use super::Extent;
+use super::extent::Extent;
 use std::collections::BTreeSet;
 
 /// Takes the first point of every cell.

@@ -1,0 +1,50 @@
+//! What the exit code of the command means.
+
+/// What the command's exit code says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExitCode {
+    /// The mark is there.
+    Match = 0,
+    /// The mark would have shown, and does not.
+    NoMatch = 1,
+    /// The command line, an option or a key or record file is wrong.
+    Usage = 2,
+    /// The suspect cannot answer the question.
+    Inconclusive = 3,
+    /// The record does not belong to this reference or this key.
+    DoesNotBelong = 4,
+    /// An input cannot be read.
+    Unreadable = 5,
+    /// An input is too large.
+    TooLarge = 6,
+    /// An output cannot be written.
+    Unwritable = 7,
+}
+
+impl ExitCode {
+    /// All of them.
+    pub const ALL: [ExitCode; 8] = [
+        ExitCode::Match,
+        ExitCode::NoMatch,
+        ExitCode::Usage,
+        ExitCode::Inconclusive,
+        ExitCode::DoesNotBelong,
+        ExitCode::Unreadable,
+        ExitCode::TooLarge,
+        ExitCode::Unwritable,
+    ];
+
+    /// What it means to `meshmark verify`.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            ExitCode::Match => "match",
+            ExitCode::NoMatch => "no match",
+            ExitCode::Usage => "usage",
+            ExitCode::Inconclusive => "inconclusive",
+            ExitCode::DoesNotBelong => "the record does not belong to this reference or key",
+            ExitCode::Unreadable => "unreadable input",
+            ExitCode::TooLarge => "too large",
+            ExitCode::Unwritable => "an output cannot be written",
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Where a map is.
+
+use meshmark_core::{ground::Ground, vertices::VertexTable};
+use serde::Serialize;
+
+/// The rectangle of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Extent {
+    /// Lower left corner, CRS units.
+    pub lower: [f64; 2],
+    /// Upper right corner, CRS units.
+    pub upper: [f64; 2],
+    /// Metres on the ground per CRS unit in its middle, of x and of y.
+    pub metres_per_unit: [f64; 2],
+}
+
+impl Extent {
+    pub(crate) fn of(vertices: &VertexTable, ground: &Ground) -> Self {
+        let (lower, upper) = vertices.bounds();
+        Extent { lower, upper, metres_per_unit: ground.metres_per_unit(vertices.centre()) }
+    }
+
+    /// Width and height on the ground, metres.
+    pub(crate) fn size_m(&self) -> [f64; 2] {
+        [0, 1].map(|axis| (self.upper[axis] - self.lower[axis]) * self.metres_per_unit[axis])
+    }
+}
