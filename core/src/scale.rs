@@ -131,15 +131,17 @@ impl Measure<'_> {
         [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
     }
 
-    /// The vertex at which the one scale of the mark is wrong by the largest share, and that share, where it is more
-    /// than version 1 of the mark allows.
-    pub fn worst_vertex(&self, vertices: &VertexTable) -> Option<([f64; 2], f64)> {
+    /// The largest share by which the one scale of the mark is wrong at a vertex, where it is more than version 1 of the
+    /// mark allows, and the two vertices where a unit is the shortest and the longest.
+    pub fn unevenness(&self, vertices: &VertexTable) -> Option<(f64, [[f64; 2]; 2])> {
         let (Some(lattice), Ground::Plane { metres_per_unit }) = (self.lattice, self.ground) else {
             return None;
         };
-        let off = |&at: &[f64; 2]| Some((at, lattice.at(at)?.off(metres_per_unit)));
-        let worst = vertices.coords().iter().filter_map(off).max_by(|(_, a), (_, b)| a.total_cmp(b));
-        worst.filter(|(_, off)| *off > MOST_OFF)
+        let scales = || vertices.coords().iter().filter_map(|&at| Some((at, lattice.at(at)?)));
+        let off = scales().map(|(_, scale)| scale.off(metres_per_unit)).fold(0.0, f64::max);
+        let (shortest, _) = scales().min_by(|(_, a), (_, b)| a.extremes[0].total_cmp(&b.extremes[0]))?;
+        let (longest, _) = scales().max_by(|(_, a), (_, b)| a.extremes[1].total_cmp(&b.extremes[1]))?;
+        (off > MOST_OFF).then_some((off, [shortest, longest]))
     }
 }
 
@@ -173,8 +175,14 @@ mod tests {
             assert!((found / exact - 1.0).abs() < 3e-3, "{y}: {found} {exact}");
         }
         let measure = Measure { ground: Ground::Plane { metres_per_unit: one }, lattice: Some(&lattice) };
-        let (worst, off) = measure.worst_vertex(&world).unwrap();
-        assert!(off > 0.05 && world.coords().contains(&worst));
+        let (off, [shortest, longest]) = measure.unevenness(&world).unwrap();
+        let away = |place: [f64; 2]| place[1].abs();
+        let ends = world
+            .coords()
+            .iter()
+            .map(|place| away(*place))
+            .fold((f64::MAX, 0f64), |(a, b), y| (a.min(y), b.max(y)));
+        assert!(off > 0.05 && (away(longest), away(shortest)) == ends);
     }
 
     #[test]

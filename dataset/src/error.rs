@@ -20,7 +20,7 @@ pub enum Error {
     Reprojection { layer: String, reason: String },
     TooLarge { most: usize },
     TooSmall { size_m: f64, tolerance_m: f64 },
-    UnevenScale { at: [f64; 2], off_percent: f64, crs: String },
+    UnevenScale { ends: [[f64; 2]; 2], off_percent: f64, crs: String },
     UnknownFormat { named: Option<String>, extension: Option<String>, known: String },
     OneLayer { driver: &'static str },
     NotWgs84 { driver: &'static str, layer: String },
@@ -117,10 +117,12 @@ impl Error {
                 spelling.name("TOLERANCE"),
                 spelling.name("AMPLITUDE")
             ),
-            Error::UnevenScale { at: [x, y], off_percent, crs } => format!(
-                "at the vertex ({x}, {y}) the scale of {crs} differs by {off_percent:.0} % from the one that a mark takes for \
-                 the whole map, so vertices would move further than is asked for: reproject the map, for example to its \
-                 UTM zone or to EPSG:4326, or leave out what lies far from the rest"
+            Error::UnevenScale { ends: [shortest, longest], off_percent, crs } => format!(
+                "the scale of {crs} differs by {off_percent:.0} % from the one that a mark takes for the whole map, so vertices \
+                 would move further than is asked for: a unit is the shortest at the vertex ({}, {}), and the longest at \
+                 ({}, {}); reproject the map, for example to its UTM zone or to EPSG:4326, or leave out what lies far from \
+                 the rest",
+                shortest[0], shortest[1], longest[0], longest[1]
             ),
             Error::UnknownFormat { named, extension, known } => {
                 let what = match (named, extension) {

@@ -41,13 +41,13 @@ pub fn places(text: &[u8]) -> Option<Vec<Place>> {
 /// let feature = br#"{"type": "Feature", "id": 7, "bbox": [1, 2, 1, 2], "properties": {"a": 1},
 ///                    "geometry": {"type": "Point", "coordinates": [1, 2]}}"#;
 /// assert_eq!(without_places(feature).unwrap(), br#"{"id":7,"bbox":null,"properties":{}}"#);
+/// // What GDAL writes of itself needs no text.
 /// assert_eq!(without_places(br#"{"type": "Feature", "properties": {"a": 1}}"#), None);
 /// ```
 pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
     let all = Text(text);
     let members = all.members(0..text.len())?;
-    let has_properties =
-        members.iter().any(|(key, value)| *key == b"properties" && text[value.start] == b'{');
+    let has_properties = members.iter().any(|(key, _)| *key == b"properties");
     let mut kept = Vec::new();
     for (key, value) in members {
         let value = match key {
@@ -59,13 +59,34 @@ pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
         };
         kept.push([b"\"", key, b"\":", &value].concat());
     }
-    if kept.is_empty() {
-        return None;
-    }
-    if has_properties {
-        kept.push(b"\"properties\":{}".into());
+    match has_properties {
+        true if kept.is_empty() => return None,
+        true => kept.push(b"\"properties\":{}".into()),
+        false => {} // GDAL writes none then
     }
     Some([b"{".as_slice(), &kept.join(&b','), b"}"].concat())
+}
+
+/// Whether a foreign member of a feature or its geometry holds a geometry or a bounding box, which nobody marks.
+pub fn has_foreign_places(text: &[u8]) -> bool {
+    let all = Text(text);
+    let Some(members) = all.members(0..text.len()) else { return false };
+    members.into_iter().any(|(key, value)| match key {
+        b"type" | b"id" | b"bbox" | b"properties" => false,
+        b"geometry" => all.members(value).unwrap_or_default().into_iter().any(|(key, value)| {
+            !matches!(key, b"type" | b"bbox" | b"coordinates" | b"geometries") && names_places(&text[value])
+        }),
+        _ => names_places(&text[value]),
+    })
+}
+
+/// Inside a text quotes have backslashes before them, so what is found is a key.
+fn names_places(value: &[u8]) -> bool {
+    let has = |key: &[u8]| {
+        let at = value.windows(key.len()).position(|bytes| bytes == key);
+        at.is_some_and(|at| value[at + key.len()..].trim_ascii_start().starts_with(b":"))
+    };
+    has(b"\"coordinates\"") || has(b"\"bbox\"")
 }
 
 /// The numbers of a position or a bounding box, as they are written.
@@ -240,7 +261,7 @@ mod tests {
     #[test]
     fn what_features_hold_themselves_is_left_out_and_all_else_stays() {
         let cases = [
-            (r#"{ "id": "a\"]}, b", "properties": null, "n": NaN }"#, Some(r#"{"id":"a\"]}, b","n":NaN}"#)),
+            (r#"{ "id": "a\"]}, b", "n": NaN }"#, Some(r#"{"id":"a\"]}, b","n":NaN}"#)),
             (
                 r#"{ "name": "x", "bbox": [ 1, 2 ], "more": { "bbox": [ 3, 4 ] } }"#,
                 Some(r#"{"name":"x","bbox":null,"more":{ "bbox": [ 3, 4 ] }}"#),
@@ -261,12 +282,31 @@ mod tests {
                     r#"{"geometry":{"geometries":[{"coordinates":[0,0],"bbox":null,"a":[1,2]},{"coordinates":[]}]}}"#,
                 ),
             ),
-            (r#"{"geometry":null}"#, None),
-            ("{}", None),
-            (" { } ", None),
+            (r#"{"geometry":null}"#, Some("{}")),
+            (r#"{"properties":null,"x":1}"#, Some(r#"{"x":1,"properties":{}}"#)),
+            (r#"{"properties":null}"#, None),
+            ("{}", Some("{}")),
+            (" { } ", Some("{}")),
         ];
         for (text, expected) in cases {
             assert_eq!(kept(text).as_deref(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn foreign_members_that_hold_places_are_found() {
+        for (text, expected) in [
+            (
+                r#"{"bbox":[1],"geometry":{"coordinates":[1,2]},"properties":{"coordinates":[1]},"x":[1,2]}"#,
+                false,
+            ),
+            (r#"{"x":"\"coordinates\": [1, 2]","y":"coordinates"}"#, false),
+            (r#"{"place":{"type":"Point","coordinates": [1, 2]}}"#, true),
+            (r#"{"tile":{"a":{"bbox" :[1,2,3,4]}}}"#, true),
+            (r#"{"geometry":{"coordinates":[1,2],"meta":{"coordinates":[1,2]}}}"#, true),
+            ("null", false),
+        ] {
+            assert_eq!(has_foreign_places(text.as_bytes()), expected, "{text}");
         }
     }
 

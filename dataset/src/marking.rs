@@ -14,7 +14,7 @@ use meshmark_core::{
     embedding::Marked,
     key::SecretKey,
     map::Map,
-    message::{LEAST_IDENTIFYING_BITS, Message},
+    message::{ADVISED_BITS, LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Spelling, Subject},
     record::{self, Distortion, Record, Reference, TopologyEntry},
     scale::Measure,
@@ -88,11 +88,11 @@ pub fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
 /// # Errors
 /// [`Error::UnevenScale`].
 pub fn check_scale(map: &Map, crs: Option<&CoordinateSystem>) -> Result<()> {
-    match map.measure().worst_vertex(map.vertices) {
+    match map.measure().unevenness(map.vertices) {
         None => Ok(()),
-        Some((at, off)) => {
+        Some((off, ends)) => {
             let crs = crs.map_or_else(String::new, CoordinateSystem::brief_name);
-            Err(Error::UnevenScale { at, off_percent: 100.0 * off, crs })
+            Err(Error::UnevenScale { ends, off_percent: 100.0 * off, crs })
         }
     }
 }
@@ -116,7 +116,7 @@ pub fn warnings(
             "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
              hexadecimal digits or more",
             message.len(),
-            LEAST_IDENTIFYING_BITS / 4
+            ADVISED_BITS / 4
         ));
     }
     let channel_bits = parameters.code.encode(message).len();
@@ -154,6 +154,14 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
          anybody can undo the mark; leave it out, for example with -select, or open a CSV file with {}",
         NO_TEXT_OF_GEOMETRY.trim_start_matches('@')
     ))
+}
+
+/// What to say of a layer of a GeoJSON file whose features have foreign members that hold places.
+pub fn foreign_places(layer: &str) -> String {
+    format!(
+        "layer \"{layer}\" has geometries or bounding boxes in foreign members of its features, which stay as they are: with \
+         them anybody can undo the mark; leave them out, for example by a conversion with -noNativeData"
+    )
 }
 
 /// The first attribute that holds a geometry as text in one of the first features, whatever its name.

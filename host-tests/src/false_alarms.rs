@@ -113,8 +113,8 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         evidence_map: false,
     };
     let mut progress = Progress::default();
-    let map = verify::read_reference(&request, &mut progress)?;
-    Ok(verify::examine(&request, &map, &mut progress)?.found?)
+    let map = verify::read_reference(&request, &mut progress)?.or_fail()?;
+    Ok(verify::examine(&request, &map, &mut progress)?.or_fail()?.found?)
 }
 
 fn decide(found: &Demodulation, carried: Message) -> Decision {

@@ -206,6 +206,54 @@ fn the_extent_a_geojson_file_speaks_of_is_not_copied() {
 }
 
 #[test]
+fn a_damaged_copy_is_not_taken_for_a_finished_one() {
+    let host = host();
+    let run = || distribute(&host, "out", "map.gpkg", &[], "2");
+    run().succeeds();
+    let (_, stem) = RECIPIENTS[0];
+    let copy = host.path(&format!("out/{stem}.gpkg"));
+    let whole = fs::read(&copy).unwrap();
+    for damaged in [&whole[..20_000], &[]] {
+        fs::write(&copy, damaged).unwrap();
+        let again = run();
+        assert!(
+            again.code == Some(2) && again.stderr.contains("is damaged or was changed"),
+            "{}",
+            again.stderr
+        );
+        assert!(again.stderr.contains(stem) && fs::read(&copy).unwrap() == damaged);
+    }
+    fs::write(&copy, whole).unwrap();
+    run().succeeds();
+}
+
+#[test]
+fn foreign_members_that_hold_places_are_warned_of_on_all_three_ways() {
+    let host = host();
+    host.run("ogr2ogr", &["-f", "GeoJSON", "plain.geojson", "map.gpkg", "buildings"]).succeeds();
+    let mut map: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(host.path("plain.geojson")).unwrap()).unwrap();
+    for feature in map["features"].as_array_mut().unwrap() {
+        feature["place"] = feature["geometry"].clone();
+    }
+    fs::write(host.path("map.geojson"), map.to_string()).unwrap();
+    let warned = "in foreign members of its features, which stay as they are";
+    for (source, times) in [("map.geojson", 1), ("plain.geojson", 0)] {
+        let said = [
+            host.mark("GeoJSON", &format!("read_{source}"), source, &[]).succeeds().stderr,
+            host.create(&format!("written_{source}"), source, &[]).succeeds().stderr,
+            distribute(&host, source.trim_end_matches(".geojson"), source, &["-f", "GeoJSON"], "2")
+                .succeeds()
+                .stderr,
+        ];
+        for said in said {
+            assert_eq!(said.matches(warned).count(), times, "{source}: {said}");
+        }
+        fs::remove_file(host.path("ref.gpkg")).unwrap();
+    }
+}
+
+#[test]
 fn what_ogr2ogr_warns_of_is_said_once() {
     let host = host();
     let sql = "ALTER TABLE buildings ADD COLUMN longer_than_ten TEXT";

@@ -59,8 +59,9 @@ extern "C"
     // False and a failure when layer number `number` has not given as many features as it had when it was marked.
     bool meshmark_is_complete(const MeshmarkMarking *, const char *layer, int number, uint64_t features);
 
-    // Leaves places out of the native data of a feature (src/ffi_native_data.rs).
-    void meshmark_clear_native_data(OGRFeatureH);
+    // Leaves places out of the native data of a feature; whether its foreign members hold some (src/ffi_native_data.rs).
+    bool meshmark_clear_native_data(OGRFeatureH);
+    void meshmark_warn_of_foreign_places(const char *layer);
     // The native data of a layer, without places; the caller frees it.
     char **meshmark_native_data(CSLConstList metadata);
 
@@ -176,6 +177,7 @@ class MeshmarkLayer final : public OGRLayer
     const MeshmarkMarking *const m_marking;
     const bool m_marked;
     CPLStringList m_nativeData;       // words of a GeoJSON file, without places
+    bool m_warnedOfPlaces = false;    // that foreign members hold some
     bool m_evaluatesGeometry = false; // the attribute filter does
     bool m_readsAll = false;          // whatever the filters
     bool m_ended = false;

@@ -1,4 +1,5 @@
 use meshmark_dataset::decimals::Digits;
+use std::io::{self, ErrorKind};
 
 /// Why a map cannot be marked. Every message says what to do about it.
 #[derive(Debug, thiserror::Error)]
@@ -50,8 +51,14 @@ pub enum Error {
          `meshmark keygen`"
     )]
     NoKey,
-    #[error("the key file {path} cannot be read ({reason}): make one with `meshmark keygen`")]
-    KeyUnreadable { path: String, reason: String },
+    #[error(
+        "the key file {path} cannot be read ({source}): {}",
+        match source.kind() {
+            ErrorKind::NotFound => "make one with `meshmark keygen`",
+            _ => "name a key file that can be read",
+        }
+    )]
+    KeyUnreadable { path: String, source: io::Error },
     #[error("the key file {path} is not usable: {source}")]
     KeyMalformed { path: String, source: meshmark_core::Error },
     #[error("neither RECIPIENT nor MESSAGE is given: give exactly one")]

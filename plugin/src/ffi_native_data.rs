@@ -1,12 +1,15 @@
 //! GDAL's native data, the words of a GeoJSON file: handed on without what they say of unmarked places.
 
 use crate::{
-    ffi_errors::guarded,
+    ffi_errors::{guarded, report},
     ffi_features::{Feature, FeatureRef},
     ffi_text::{c_string, strings, text},
 };
-use gdal_sys::OGRFeatureH;
-use meshmark_dataset::geojson_text::{MEDIA_TYPE, without_places};
+use gdal_sys::{CPLErr, OGRFeatureH};
+use meshmark_dataset::{
+    geojson_text::{MEDIA_TYPE, has_foreign_places, without_places},
+    marking::foreign_places,
+};
 use std::{
     ffi::{CStr, CString, c_char},
     ptr,
@@ -24,10 +27,10 @@ pub fn item_without_places(name: &str, value: &str) -> Option<String> {
 }
 
 impl FeatureRef<'_> {
-    /// Its native data without places; none when there is nothing left.
-    pub fn native_data(&self) -> Option<CString> {
+    /// Its native data without places, and whether its foreign members hold some; none when there is nothing left.
+    pub fn native_data(&self) -> Option<(CString, bool)> {
         // SAFETY: the feature is there; both texts are null or C strings, and are copied.
-        let data = unsafe {
+        let (data, foreign) = unsafe {
             let (data, kind) = (
                 gdal_sys::OGR_F_GetNativeData(self.handle()),
                 gdal_sys::OGR_F_GetNativeMediaType(self.handle()),
@@ -35,9 +38,10 @@ impl FeatureRef<'_> {
             if data.is_null() || !text(kind).eq_ignore_ascii_case(MEDIA_TYPE) {
                 return None;
             }
-            without_places(CStr::from_ptr(data).to_bytes())?
+            let text = CStr::from_ptr(data).to_bytes();
+            (without_places(text)?, has_foreign_places(text))
         };
-        Some(CString::new(data).expect("it was a C string"))
+        Some((CString::new(data).expect("it was a C string"), foreign))
     }
 }
 
@@ -52,16 +56,24 @@ impl Feature {
     }
 }
 
-/// Leaves places out of the native data of a feature that is handed on.
+/// Leaves places out of the native data of a feature that is handed on; whether its foreign members hold some.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) {
-    guarded((), || {
+unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) -> bool {
+    guarded(false, || {
         // SAFETY: the shim gives a feature, which stays during the call.
         let data = unsafe { FeatureRef::new(feature) }.native_data();
-        let data = data.as_ref().map_or(ptr::null(), |data| data.as_ptr());
+        let text = data.as_ref().map_or(ptr::null(), |(text, _)| text.as_ptr());
         // SAFETY: as above; the text is null or a C string, which is copied.
-        unsafe { gdal_sys::OGR_F_SetNativeData(feature, data) };
-    });
+        unsafe { gdal_sys::OGR_F_SetNativeData(feature, text) };
+        data.is_some_and(|(_, foreign)| foreign)
+    })
+}
+
+/// Warns of a layer whose features have foreign members that hold places.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn meshmark_warn_of_foreign_places(layer: *const c_char) {
+    // SAFETY: the shim gives a C string.
+    guarded((), || report(CPLErr::CE_Warning, foreign_places(&unsafe { text(layer) })));
 }
 
 /// The native data of a layer, as a list of metadata, without places; the caller frees it.

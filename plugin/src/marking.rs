@@ -91,7 +91,7 @@ fn pool(threads: usize) -> Result<ThreadPool> {
 }
 
 fn read_key(path: &str) -> Result<SecretKey> {
-    let unreadable = |e: std::io::Error| Error::KeyUnreadable { path: path.into(), reason: e.to_string() };
+    let unreadable = |source| Error::KeyUnreadable { path: path.into(), source };
     let text = File::open(path).and_then(read_text).map_err(unreadable)?;
     SecretKey::from_json(&text).map_err(|source| Error::KeyMalformed { path: path.into(), source })
 }

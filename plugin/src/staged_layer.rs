@@ -46,6 +46,8 @@ pub struct StagedLayer {
     last_id: i64,
     /// How many features there are.
     features: usize,
+    /// Whether foreign members of its features hold places.
+    pub has_foreign_places: bool,
 }
 
 /// What a GeoPackage would not give back of a feature.
@@ -95,6 +97,7 @@ impl StagedLayer {
             before_ids: None,
             last_id: 0,
             features: 0,
+            has_foreign_places: false,
         })
     }
 
@@ -122,6 +125,7 @@ impl StagedLayer {
     pub fn write(&mut self, staged: &Output, feature: FeatureRef) -> Result<i64> {
         let style = feature.style();
         let native = feature.native_data().filter(|_| self.is_json);
+        self.has_foreign_places |= native.as_ref().is_some_and(|(_, foreign)| *foreign);
         let id = feature.id();
         if id.is_some() {
             self.before_ids.get_or_insert(self.features);
@@ -151,7 +155,7 @@ impl StagedLayer {
             copy.set_text(column, &style);
         }
         if let Some((column, native)) = self.native_column.zip(native) {
-            copy.set_c_text(column, &native);
+            copy.set_c_text(column, &native.0);
         }
         for lost in &lost {
             if let Lost::Text(field, _) = *lost {

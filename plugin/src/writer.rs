@@ -19,6 +19,7 @@ use crate::{
     target::{Places, Target},
 };
 use meshmark_dataset::{
+    marking::foreign_places,
     publication::{Move, Publication},
     workplace::file_error,
 };
@@ -167,7 +168,9 @@ impl Writer {
         let names = write_marked(&file, &target, &schema, &layers, &view, described)?;
         let written = read_back::Written { path: &file, format: target.format, layers: names };
         read_back::check(&written, &view, &request, threads)?;
-        let warnings = view.marking().warnings.clone();
+        let mut warnings = view.marking().warnings.clone();
+        let told = layers.iter().filter(|layer| layer.has_foreign_places);
+        warnings.extend(told.map(|layer| foreign_places(&layer.spec.name)));
         let record = view.marking().record.clone();
         drop((view, schema));
         publish(&target, &places, &folder, record.as_deref())?;

@@ -138,8 +138,8 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
     } else if best >= each.log10() {
         let among = if tried > 1 { format!(" for each of {tried} that were tried") } else { String::new() };
         let reason = format!(
-            "a message of {bits} bits, read without an error, has a p-value of 10^{best:.1}, and a significance of \
-             {each:.1e}{among} asks for less: give a larger one, or mark with more bits"
+            "no message of {bits} bits has a p-value below 10^{best:.1}, even if every bit is right, and a significance \
+             of {each:.1e}{among} asks for less: give a larger one, or mark with more bits"
         );
         (Verdict::Inconclusive, reason)
     } else if fits(p_recipient) && is_mixed {
@@ -257,7 +257,7 @@ mod tests {
         let asked = decide_among(&found, &random(&message), 1, 1e-60);
         assert_eq!(asked.verdict, Verdict::Inconclusive);
         assert!(
-            asked.reason.contains("a p-value of 10^-28.7") && asked.reason.contains("1.0e-60"),
+            asked.reason.contains("a p-value below 10^-28.7") && asked.reason.contains("1.0e-60"),
             "{}",
             asked.reason
         );

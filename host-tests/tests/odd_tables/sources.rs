@@ -279,12 +279,23 @@ fn geojson(host: &Host, random: &mut ChaCha20Rng) -> Source {
             2 => feature["id"] = json!(number / 2),
             _ => {}
         }
+        match below(random, 20) {
+            0 => feature["properties"] = Value::Null,
+            // A reader then takes the geometry for a value of the attribute that is called so.
+            1 if !names.contains(&&"geometry") => {
+                feature.as_object_mut().unwrap().remove("properties");
+            }
+            _ => {}
+        }
         if without_place && number == 7 {
             feature["geometry"] = Value::Null;
         }
         features.push(feature);
     }
-    let mut all = json!({"type": "FeatureCollection", "name": layer, "features": features});
+    let mut all = json!({"type": "FeatureCollection", "features": features});
+    if below(random, 3) > 0 {
+        all["name"] = json!(layer);
+    }
     if foreign {
         all["bbox"] = json!([0, 0, 1, 1]);
         all["licence <1>"] = json!({"bbox": [1, 2], "by": "a & \"b\""});

@@ -1,24 +1,33 @@
 //! The copies to make: what their files are called, and which are finished.
 
 use crate::{Error, Result};
+use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::{
     key::SecretKey,
     message::Message,
     options::{Options, Subject},
     record::{Record, Reference},
 };
-use meshmark_dataset::{formats::Format, marking};
+use meshmark_dataset::{Survey, formats::Format, marking};
 use sha2::{Digest, Sha256};
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
+/// Whether GDAL opens a copy, and its layers have as many features as those of the map.
+fn has_features(file: &Path, map: &Survey) -> bool {
+    let Ok(dataset) = Dataset::open(file) else { return false };
+    map.features
+        .iter()
+        .all(|(&layer, &count)| dataset.layer(layer).is_ok_and(|layer| layer.feature_count() == count))
+}
+
 /// The longest part of a file name that is made of the recipient, characters.
 const LONGEST_SLUG: usize = 40;
 
 /// A recipient's copy.
-pub struct Copy {
+pub struct MarkedCopy {
     /// Who gets it.
     pub recipient: String,
     /// Its main file.
@@ -27,12 +36,12 @@ pub struct Copy {
     pub record: PathBuf,
 }
 
-impl Copy {
+impl MarkedCopy {
     /// The copy for a recipient, in a folder.
     pub fn new(recipient: String, folder: &Path, format: &Format) -> Self {
         let stem = stem(&recipient);
         let path = |ending: &str| folder.join(format!("{stem}{ending}"));
-        Copy { file: path(format.ending()), record: path(".json"), recipient }
+        MarkedCopy { file: path(format.ending()), record: path(".json"), recipient }
     }
 
     /// The bits that the code carries in it.
@@ -47,14 +56,24 @@ impl Copy {
 
     /// Whether file and record are there already, the record being that of this marking. Only then may anything be
     /// where the copy goes.
-    pub fn is_finished(&self, options: &Options, key: &SecretKey, reference: &Reference) -> Result<bool> {
+    pub fn is_finished(
+        &self,
+        options: &Options,
+        key: &SecretKey,
+        (map, reference): (&Survey, &Reference),
+    ) -> Result<bool> {
         let refused = |path: &Path, why| Err(Error::InTheWay { path: path.into(), why });
         let has_record = self.record.symlink_metadata().is_ok();
         if has_record && !self.is_record_of_this(options, key, reference) {
             return refused(&self.record, "is not the record of this map, key, recipient and options");
         }
         if has_record && self.file.is_file() {
-            return Ok(true);
+            return match has_features(&self.file, map) {
+                true => Ok(true),
+                false => {
+                    refused(&self.file, "is damaged or was changed: it does not have the features of the map")
+                }
+            };
         }
         match self.in_the_way() {
             Some(path) => refused(&path, "is there and is no finished copy"),

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use meshmark_dataset::{
-    geojson_text::{Place, numbers, places},
+    geojson_text::{self, Place, numbers, places},
     workplace::file_error,
 };
 use std::{
@@ -26,6 +26,18 @@ pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
         Err(error) => Err(file_error("writing", file, error).into()),
         Ok(()) => Ok(()),
     }
+}
+
+/// Whether foreign members of a feature hold places.
+pub fn has_foreign_places(path: &Path) -> Result<bool> {
+    let failed = |error| file_error("reading", path, error);
+    let (mut file, mut line) = (File::open(path).map(BufReader::new).map_err(failed)?, Vec::new());
+    while next(&mut file, &mut line).map_err(failed)? {
+        if is_feature(&line) && geojson_text::has_foreign_places(&line) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 fn join(mut plain: impl BufRead, mut marked: impl BufRead, mut to: impl Write) -> io::Result<()> {

@@ -24,7 +24,7 @@ mod writing;
 pub use request::Request;
 
 use crate::{Error, Result, inputs::maps, progress::Progress};
-use copies::Copy;
+use copies::MarkedCopy;
 use meshmark_core::{embedding::Embedding, key::RECIPIENT_BITS, options::Spelling};
 use meshmark_dataset::{
     Survey, ThreadPool,
@@ -63,11 +63,11 @@ pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnM
     let done = Workplace::new(folder).map_err(Error::from).and_then(|workplace| {
         progress.start("reading", 0);
         let (dataset, map) = maps::source(&request.map, options, warn)?;
-        let mut copies: Vec<Copy> =
-            recipients.into_iter().map(|recipient| Copy::new(recipient, folder, format)).collect();
+        let mut copies: Vec<MarkedCopy> =
+            recipients.into_iter().map(|recipient| MarkedCopy::new(recipient, folder, format)).collect();
         let all = copies.len();
         let reference = marking::reference(&map, 0);
-        let finished = copies.iter().map(|copy| copy.is_finished(options, key, &reference));
+        let finished = copies.iter().map(|copy| copy.is_finished(options, key, (&map, &reference)));
         let finished: Vec<bool> = finished.collect::<Result<_>>()?;
         let mut finished = finished.into_iter();
         copies.retain(|_| !finished.next().expect("one of each"));
@@ -98,7 +98,7 @@ fn run(
     request: &Request,
     survey: &Survey,
     (format, stage): (&'static Format, &Stage),
-    copies: &[Copy],
+    copies: &[MarkedCopy],
     progress: &mut Progress,
     warn: &mut dyn FnMut(&str),
 ) -> Result<()> {

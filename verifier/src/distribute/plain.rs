@@ -3,7 +3,11 @@
 
 use super::{flatgeobuf, geojson, moving, ogr2ogr, staged::Staged};
 use crate::{Error, Result};
-use meshmark_dataset::{formats::Format, marking::Moves, workplace::file_error};
+use meshmark_dataset::{
+    formats::Format,
+    marking::{Moves, foreign_places},
+    workplace::file_error,
+};
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -19,15 +23,18 @@ pub struct Plain {
 }
 
 impl Plain {
-    /// Copies the map into an empty folder; `warn` hears what `ogr2ogr` warns of.
+    /// Copies the map, of one layer, into an empty folder; `warn` hears what `ogr2ogr` warns of.
     pub fn new(
-        map: &Path,
+        (map, layer): (&Path, &str),
         folder: &Path,
         format: &'static Format,
         warn: &mut dyn FnMut(&str),
     ) -> Result<Self> {
         let path = folder.join("map").with_extension(&format.ending()[1..]);
         ogr2ogr::copy(format.driver, map, &path, &[])?.iter().for_each(|text| warn(text));
+        if format.has_native_data() && geojson::has_foreign_places(&path)? {
+            warn(&foreign_places(layer));
+        }
         Ok(Plain { path, driver: format.driver })
     }
 

@@ -40,7 +40,7 @@ impl Stage {
             ogr2ogr::copy("GPKG", &request.map, &path, &options)?.iter().for_each(|text| warn(text));
             (Staged::read(path, &map.data.vertices, marks)?, None)
         } else {
-            let plain = Plain::new(&request.map, &workplace.subfolder("plain")?, format, warn)?;
+            let plain = Plain::new((&request.map, &layers[0]), &workplace.subfolder("plain")?, format, warn)?;
             let failed = |error| maps::failed("map", &request.map, error);
             copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path).map_err(
                 |error| Error::NotWritten { what: path.display().to_string(), reason: error.to_string() },

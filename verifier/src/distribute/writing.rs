@@ -1,6 +1,6 @@
 //! A copy: written, read back, published.
 
-use super::{copies::Copy, moving, staging::Stage};
+use super::{copies::MarkedCopy, moving, staging::Stage};
 use crate::{
     Error, Result,
     inputs::gdal_failures::{forget_failure, last_failure},
@@ -37,7 +37,7 @@ pub struct Job<'a> {
 }
 
 /// Writes, checks and publishes a copy and its record.
-pub fn write(job: &Job, copy: &Copy, moved: &[[f64; 2]], distortion: Distortion) -> Result<()> {
+pub fn write(job: &Job, copy: &MarkedCopy, moved: &[[f64; 2]], distortion: Distortion) -> Result<()> {
     let workplace = Workplace::new(job.folder)?;
     let folder = workplace.subfolder("out")?;
     let file = folder.join(copy.file.file_name().expect("a copy has a name"));
@@ -84,7 +84,13 @@ fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
 }
 
 /// Puts the record and the files in `folder` into their places, the main file last.
-fn publish(copy: &Copy, workplace: &Workplace, folder: &Path, record: &str, format: &Format) -> Result<()> {
+fn publish(
+    copy: &MarkedCopy,
+    workplace: &Workplace,
+    folder: &Path,
+    record: &str,
+    format: &Format,
+) -> Result<()> {
     let mut publication = Publication::default();
     // Without links and from the root: who takes a publication back may be elsewhere.
     let places = workplace.folder().parent().expect("a workplace is in a folder");
