@@ -8,13 +8,13 @@ use std::{collections::BTreeMap, ops::Range};
 #[derive(Clone, Default)]
 pub(crate) struct Chains {
     pub(crate) coords: Vec<[f64; 2]>,
-    /// Where in `coords` each of them starts, ascending.
+    /// The index in `coords` where each of them starts, ascending.
     pub(crate) starts: Vec<u32>,
-    /// What each of them is.
+    /// The kind of each of them.
     pub(crate) kinds: Vec<Step>,
-    /// Which of them is the first of each geometry, ascending.
+    /// The number of the first of them in each geometry, ascending.
     pub(crate) firsts: Vec<u32>,
-    /// The geometries that are more than their chains, by their numbers.
+    /// The geometries that their chains do not describe completely, by their numbers.
     pub(crate) others: BTreeMap<u32, Vec<u8>>,
 }
 
@@ -42,13 +42,13 @@ impl Chains {
         self.kinds.append(&mut other.kinds);
     }
 
-    /// Where each chain is in `coords`.
+    /// Returns the range of each chain in `coords`.
     fn ranges(&self, coords: usize) -> impl Iterator<Item = Range<usize>> {
         let ends = self.starts.iter().skip(1).map(|&start| start as usize).chain([coords]);
         self.starts.iter().zip(ends).map(|(&start, end)| start as usize..end)
     }
 
-    /// Pairs of consecutive vertices; `indices` are those of every coordinate.
+    /// Returns the pairs of consecutive vertices; `indices` holds the vertex of every coordinate.
     pub(crate) fn segments(&self, indices: &[u32]) -> Vec<[u32; 2]> {
         let mut segments: Vec<[u32; 2]> = self
             .ranges(indices.len())
@@ -62,7 +62,8 @@ impl Chains {
         segments
     }
 
-    /// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
+    /// Joins the vertices of every polygon, with its holes, and returns, for each of `vertices` vertices, the
+    /// first one of its polygon group.
     pub(crate) fn polygon_roots(&self, indices: &[u32], vertices: usize) -> Vec<u32> {
         let mut joined = DisjointSets::new(vertices);
         let mut shell = 0;
