@@ -1,4 +1,5 @@
-//! GDAL's native data, the words of a GeoJSON file: handed on without what they say of unmarked places.
+//! GDAL's native data, the members of a GeoJSON file beyond GDAL's own model: they are passed on without
+//! unmarked positions.
 
 use crate::{
     ffi_errors::guarded,
@@ -12,10 +13,12 @@ use std::{
     ptr,
 };
 
-/// The metadata domain of a layer, and the name of the item and of the layer creation option that hold the words.
+/// The metadata domain of a layer, and the name of the item and of the layer creation option that hold native
+/// data.
 pub const NATIVE_DATA: &str = "NATIVE_DATA";
 
-/// A NAME=VALUE pair of a layer's native data, without places; none when nothing is left.
+/// Returns the value of a NAME=VALUE pair of a layer's native data without positions; `None` when nothing is
+/// left.
 pub fn item_without_places(name: &str, value: &str) -> Option<String> {
     if !name.eq_ignore_ascii_case(NATIVE_DATA) {
         return Some(value.into());
@@ -24,7 +27,7 @@ pub fn item_without_places(name: &str, value: &str) -> Option<String> {
 }
 
 impl FeatureRef<'_> {
-    /// Its native data without places; none when there is nothing left.
+    /// Returns its native data without positions; `None` when nothing is left.
     pub fn native_data(&self) -> Option<CString> {
         // SAFETY: the feature is there; both texts are null or C strings, and are copied.
         let data = unsafe {
@@ -42,7 +45,7 @@ impl FeatureRef<'_> {
 }
 
 impl Feature {
-    /// Gives it native data.
+    /// Sets its native data.
     pub fn set_native_data(&self, data: &CStr) {
         // SAFETY: the feature is ours, and both texts are copied.
         unsafe {
@@ -52,7 +55,7 @@ impl Feature {
     }
 }
 
-/// Leaves places out of the native data of a feature that is handed on.
+/// Removes positions from the native data of a feature that is passed on.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) {
     guarded((), || {
@@ -64,7 +67,7 @@ unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) {
     });
 }
 
-/// The native data of a layer, as a list of metadata, without places; the caller frees it.
+/// Returns the native data of a layer, as a list of metadata, without positions; the caller frees it.
 ///
 /// # Safety
 /// `metadata` is null or an array of C strings that ends in null.
