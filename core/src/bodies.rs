@@ -3,14 +3,14 @@
 use crate::{disjoint_sets::DisjointSets, map::Map};
 use std::collections::BTreeMap;
 
-/// A group of polygons of more vertices stays free: moved as one, it would carry as little as one building.
+/// A group of polygons with more vertices stays free: as one body it would carry as little as one building.
 pub const MOST_VERTICES: usize = 60;
 
 /// The groups of polygons that move as one.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Bodies {
     bodies: Vec<Body>,
-    /// Of every vertex the number of its body, or [`FREE`]; empty without bodies.
+    /// For every vertex the number of its body, or [`FREE`]; empty without bodies.
     number: Vec<u32>,
 }
 
@@ -21,7 +21,7 @@ const FREE: u32 = u32::MAX;
 pub struct Body {
     /// Canonical indices of its vertices, ascending.
     pub members: Vec<u32>,
-    /// Where each of them is from the mean of all, metres.
+    /// The vector from the mean of all vertices to each of them, metres.
     pub arms_m: Vec<[f64; 2]>,
     /// Metres per CRS unit along x and y.
     pub scale: [f64; 2],
@@ -30,15 +30,15 @@ pub struct Body {
 /// A rigid motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Motion {
-    /// Of the mean of the vertices, metres.
+    /// The shift of the mean of the vertices, metres.
     pub shift_m: [f64; 2],
-    /// About it, radians.
+    /// The turn about that mean, radians.
     pub turn: f64,
 }
 
 impl Bodies {
-    /// The groups of polygons of `map`; `touching` are vertices that lie on segments: a corner on the wall of another
-    /// polygon joins the two.
+    /// Finds the groups of polygons of `map`. `touching` are vertices that lie on segments: a corner on the
+    /// wall of another polygon joins the two.
     pub(crate) fn find(map: &Map, touching: impl Iterator<Item = (u32, [u32; 2])>) -> Self {
         let in_polygon = sizes(map.polygon_roots);
         let mut groups = DisjointSets::new(map.polygon_roots.len());
@@ -60,18 +60,18 @@ impl Bodies {
         Bodies { bodies, number }
     }
 
-    /// All of them; the position of a body is its number.
+    /// Returns all bodies; the position of a body is its number.
     pub fn as_slice(&self) -> &[Body] {
         &self.bodies
     }
 
-    /// The number of the body a vertex belongs to.
+    /// Returns the number of the body a vertex belongs to.
     pub fn number_at(&self, vertex: u32) -> Option<usize> {
         self.number.get(vertex as usize).filter(|number| **number != FREE).map(|number| *number as usize)
     }
 }
 
-/// How many vertices have each as their first one.
+/// Counts, for every vertex, the vertices whose polygon root it is.
 fn sizes(first: &[u32]) -> Vec<u32> {
     let mut sizes = vec![0; first.len()];
     first.iter().for_each(|&v| sizes[v as usize] += 1);
@@ -91,7 +91,8 @@ impl Body {
         Body { members, arms_m, scale }
     }
 
-    /// The rigid motion nearest to displacements of the vertices (metres), for small turns: linear in them.
+    /// Returns the rigid motion nearest to displacements of the vertices (metres). It is linear in them, as
+    /// turns are small.
     pub(crate) fn nearest_motion(&self, displacements_m: &[[f64; 2]]) -> Motion {
         let turned =
             self.arms_m.iter().zip(displacements_m).map(|(r, d)| r[0] * d[1] - r[1] * d[0]).sum::<f64>();
@@ -99,14 +100,15 @@ impl Body {
         Motion { shift_m: mean(displacements_m), turn }
     }
 
-    /// The displacement of every vertex under a motion, metres. The turn is a rotation, not its linear part.
+    /// Returns the displacement of every vertex under a motion, metres. The turn is a true rotation, not its
+    /// linear part.
     pub(crate) fn displacements_m(&self, motion: &Motion) -> impl Iterator<Item = [f64; 2]> {
         let (sin, versine) = (motion.turn.sin(), 2.0 * (motion.turn / 2.0).sin().powi(2));
         let [x, y] = motion.shift_m;
         self.arms_m.iter().map(move |r| [x - versine * r[0] - sin * r[1], y + sin * r[0] - versine * r[1]])
     }
 
-    /// The motion, made so much smaller that no vertex moves further than `tolerance_m`.
+    /// Shrinks a motion until no vertex moves further than `tolerance_m`.
     pub(crate) fn within(&self, motion: Motion, tolerance_m: f64) -> Motion {
         let furthest =
             |motion: &Motion| self.displacements_m(motion).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
@@ -117,7 +119,7 @@ impl Body {
         limited
     }
 
-    /// Σ |r|², square metres.
+    /// Returns Σ |r|², square metres.
     pub(crate) fn inertia(&self) -> f64 {
         self.arms_m.iter().map(|[x, y]| x * x + y * y).sum()
     }

@@ -6,18 +6,19 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-/// Chips p_i = ±1, one sequence for each patch and axis: equal carriers could be averaged out of a map.
+/// Chips p_i = ±1. Every patch and axis has a sequence of its own: equal carriers could be averaged out of a
+/// map.
 pub struct Carrier {
     seed: [u8; 32],
 }
 
 impl Carrier {
-    /// The carrier of a key.
+    /// Creates the carrier of a key.
     pub fn new(key: &SecretKey) -> Self {
         Carrier { seed: key.chip_seed() }
     }
 
-    /// `count` chips of a patch and axis (0 = x, 1 = y): bits of ChaCha20 stream 2·patch + axis,
+    /// Returns `count` chips of a patch and axis (0 = x, 1 = y): the bits of ChaCha20 stream 2·patch + axis,
     /// least significant bit of each 64-bit word first.
     pub fn chips(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
         let mut stream = ChaCha20Rng::from_seed(self.seed);
@@ -33,7 +34,8 @@ impl Carrier {
     }
 }
 
-/// The channel bit that coefficient `i` (1 … m·c) carries; coefficient 0 is the mean and carries none.
+/// Returns the channel bit that coefficient `i` (1 … m·c) carries. Coefficient 0 is the mean and carries
+/// none.
 pub fn bit_of_coefficient(i: usize, chip_rate: usize) -> usize {
     (i - 1) / chip_rate
 }

@@ -1,10 +1,10 @@
 //! Codes: how the bits of the message become the *channel bits* that the coefficients carry.
 //!
-//! Repetition carries every message bit as it is; the chip rate repeats it. LDPC is the code TC256 of CCSDS
-//! 231.1-O-1 (*Short Block Length LDPC Codes for TC Synchronization and Channel Coding*): 128 message bits become
-//! 256, the message first, so that chip rate 1 displaces as much as repetition does with chip rate 2. It is decoded by
-//! belief propagation and by ordered statistics (M. Fossorier, S. Lin, *Soft-decision decoding of linear
-//! block codes based on ordered statistics*, IEEE Transactions on Information Theory 41, 1995).
+//! Repetition carries every message bit unchanged; the chip rate repeats it. LDPC is the code TC256 of CCSDS
+//! 231.1-O-1 (*Short Block Length LDPC Codes for TC Synchronization and Channel Coding*): 128 message bits
+//! become 256, the message first, so chip rate 1 displaces vertices as much as repetition with chip rate 2.
+//! Belief propagation and ordered statistics decode it (M. Fossorier, S. Lin, *Soft-decision decoding of
+//! linear block codes based on ordered statistics*, IEEE Transactions on Information Theory 41, 1995).
 
 pub use crate::options::Code;
 
@@ -24,19 +24,20 @@ const N: usize = LDPC_CHANNEL_BITS;
 const K: usize = LDPC_MESSAGE_BITS;
 /// Belief propagation converges within a few dozen rounds or never.
 const MOST_ROUNDS: usize = 100;
-/// How many bits of the most reliable basis may be wrong. Where repetition of the same displacement has 4.8 % wrong
-/// bits, 46 % of the messages are read by belief propagation, 68 % with order 2 and 81 % with order 3.
+/// The order: this many bits of the most reliable basis may be wrong. Where repetition with the same
+/// displacement has 4.8 % wrong bits, belief propagation reads 46 % of the messages, order 2 reads 68 % and
+/// order 3 reads 81 %.
 const ORDER: usize = 3;
 
-/// What read the message.
+/// The decoder that read the message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decoder {
-    /// The sign of every bit: repetition has no more to say.
+    /// The sign of every bit: repetition allows nothing better.
     Sign,
     /// Belief propagation.
     BeliefPropagation,
-    /// Ordered statistics, which always come to some code word.
+    /// Ordered statistics, which always yield some code word.
     OrderedStatistics,
 }
 
@@ -45,19 +46,19 @@ pub enum Decoder {
 pub struct Decoded {
     /// The most likely message that was found.
     pub message: Message,
-    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1. With LDPC from the best code word with
-    /// this bit and the best one without it, and from how many code words that were not looked at may be
-    /// as near: the smallest of them says how far to trust the message.
+    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1. With LDPC they compare the best
+    /// code word with this bit, the best one without it, and the expected likelihood of the code words that
+    /// were not examined. The smallest ratio bounds the trust in the message.
     pub message_llrs: Vec<f64>,
-    /// Whether belief propagation came to a word that passes all parity checks, which noise alone next to never
-    /// does; `None` for repetition, which has none.
+    /// Whether belief propagation reached a word that passes all parity checks, which noise alone almost
+    /// never does; `None` for repetition, which has no checks.
     pub parity_holds: Option<bool>,
-    /// What found the message.
+    /// The decoder that found the message.
     pub decoder: Decoder,
 }
 
 impl Code {
-    /// How many channel bits carry a message.
+    /// Returns how many channel bits carry a message.
     ///
     /// # Errors
     /// [`Error::CodeLength`] when LDPC is to carry anything but 128 bits.
@@ -68,10 +69,9 @@ impl Code {
         }
     }
 
-    /// The channel bits of a message as ±1: +1 for 1, −1 for 0.
+    /// Returns the channel bits of a message as ±1: +1 for 1, −1 for 0.
     ///
-    /// # Panics
-    /// When the message does not have the length that [`Self::channel_bits`] wants.
+    /// # Panics Panics when [`Self::channel_bits`] fails for the length of the message.
     pub fn encode(self, message: &Message) -> Vec<f64> {
         match self {
             Code::Repetition => message.signs(),
@@ -79,10 +79,10 @@ impl Code {
         }
     }
 
-    /// The message of channel bits whose log-likelihood ratios, positive = 1, are given. It depends on them alone.
+    /// Decodes the message from log-likelihood ratios of channel bits, positive = 1. The result depends on
+    /// them alone.
     ///
-    /// # Panics
-    /// When LDPC does not get 256 of them.
+    /// # Panics Panics when LDPC is given other than 256 of them.
     pub fn decode(self, llrs: &[f64]) -> Decoded {
         match self {
             Code::Repetition => Decoded {
@@ -104,7 +104,7 @@ fn decode_ldpc(llrs: &[f64]) -> Decoded {
     let (_, best) = search.best;
     let decoder =
         if converged == Some(best) { Decoder::BeliefPropagation } else { Decoder::OrderedStatistics };
-    // Either value is as frequent among what was not looked at.
+    // Both values are equally frequent among the words that were not examined.
     let unseen = log_likelihood_of_unseen(llrs) - 2f64.ln();
     let likelihood = |value: usize, j: usize| log_sum(-search.least[value][j], unseen);
     Decoded {
@@ -115,37 +115,38 @@ fn decode_ldpc(llrs: &[f64]) -> Decoded {
     }
 }
 
-/// ln of the likelihoods of all code words together, had they been drawn at random, on the scale where a word of
-/// distance w has e⁻ʷ (J. Feng, K. Duffy, M. Médard, *Leveraging code structure to improve soft output for GRAND,
-/// GCD, OSD, and SCL*, arXiv 2503.16677, 2025). The near ones that were looked at count twice: to be on the safe side.
+/// Returns ln of the summed likelihoods of all code words, as if they were drawn at random, on the scale
+/// where a word of distance w has e⁻ʷ (J. Feng, K. Duffy, M. Médard, *Leveraging code structure to improve
+/// soft output for GRAND, GCD, OSD, and SCL*, arXiv 2503.16677, 2025). The near words that were examined
+/// count twice, which errs on the safe side.
 fn log_likelihood_of_unseen(llrs: &[f64]) -> f64 {
     let mean = |llr: &f64| (-llr.abs()).exp().ln_1p() - 2f64.ln();
     K as f64 * 2f64.ln() + llrs.iter().map(mean).sum::<f64>()
 }
 
-/// ln(eᵃ + eᵇ).
+/// Returns ln(eᵃ + eᵇ).
 fn log_sum(a: f64, b: f64) -> f64 {
     a.max(b) + (-(a - b).abs()).exp().ln_1p()
 }
 
-/// The word that belief propagation comes to, if it passes all parity checks.
+/// Returns the word that belief propagation reaches, if it passes all parity checks.
 fn believe(llrs: &[f64]) -> Option<Word> {
     let mut beliefs: Vec<f64> = vec![0.0; LDPC.decode_ms_working_len()];
     let mut signs = vec![0; LDPC.decode_ms_working_u8_len()];
     let mut output = vec![0; LDPC.output_len()];
     let for_zero: Vec<f64> = llrs.iter().map(|llr| -llr).collect(); // positive = 0 over there
     let (holds, _) = LDPC.decode_ms(&for_zero, &mut output, &mut beliefs, &mut signs, MOST_ROUNDS);
-    // Zeros pass every check: that nothing is known is no evidence.
+    // Zeros pass every check, and the absence of information is no evidence.
     (holds && llrs.iter().any(|llr| *llr != 0.0)).then(|| Word::from_bytes(&output))
 }
 
-/// The code words near to what was received, from the likeliest bits on.
+/// The search for code words near the received word, which starts from the most reliable bits.
 struct Search {
     /// A basis of the code: row i alone has a 1 at the i-th of the K most reliable independent places.
     rows: Vec<Word>,
     /// |llr| at those places, descending.
     costs: Vec<f64>,
-    /// What was received, bit by bit.
+    /// The received word, bit by bit.
     received: Word,
     /// The code word that agrees with it at all of those places.
     start: Word,
@@ -155,7 +156,7 @@ struct Search {
     best: (f64, Word),
     /// The distance of the nearest code word whose message bit j is 0, and of the one where it is 1.
     least: [[f64; K]; 2],
-    /// The largest of these: what is further says nothing.
+    /// The largest of these distances: words further away do not matter.
     relevant: f64,
 }
 
@@ -198,7 +199,8 @@ impl Search {
         }
     }
 
-    /// Looks at every code word that differs from the start in at most `order` places of the basis, and at one more.
+    /// Examines every code word that differs from the start in at most `order` places of the basis, and one
+    /// more word.
     fn all(&mut self, order: usize, more: Option<&Word>) {
         self.look_at(self.start);
         if let Some(word) = more {
@@ -207,8 +209,9 @@ impl Search {
         self.around(self.start, 0.0, K, order);
     }
 
-    /// Flips up to `flips` of the first `end` places of the basis, from the least reliable on. A word is at least as
-    /// far as its flipped places cost, so what is too far already is left out without loss.
+    /// Flips up to `flips` of the first `end` places of the basis, from the least reliable on. A word is at
+    /// least as far away as its flipped places cost, so words that are too far already are skipped without
+    /// loss.
     fn around(&mut self, word: Word, cost: f64, end: usize, flips: usize) {
         for row in (0..if flips == 0 { 0 } else { end }).rev() {
             let cost = cost + self.costs[row];
@@ -248,7 +251,7 @@ impl Word {
         Word(std::array::from_fn(|part| (0..64).fold(0, |word, i| word | u64::from(bit(64 * part + i)) << i)))
     }
 
-    /// From bytes whose most significant bit comes first.
+    /// Reads bytes whose most significant bit comes first.
     fn from_bytes(bytes: &[u8]) -> Self {
         Word::from_bits(|i| bytes[i / 8] >> (7 - i % 8) & 1 == 1)
     }
@@ -398,7 +401,8 @@ mod tests {
         assert!(decoded.message_llrs.iter().all(|llr| llr.abs() < 1e-9));
     }
 
-    /// The columns of the generator: bit i of a random code word is the product of the message with column i.
+    /// Returns the columns of the generator: bit i of a random code word is the product of the message with
+    /// column i.
     fn columns() -> Vec<u128> {
         let unit = |i: usize| Word::encode(&std::array::from_fn::<bool, K, _>(|j| j == i));
         let rows: Vec<Word> = (0..K).map(unit).collect();

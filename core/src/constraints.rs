@@ -1,5 +1,5 @@
-//! What keeps vertices from moving freely: T-junctions and, with SHAPE=rigid, bodies. All of it is linear in the
-//! displacements and follows from the reference alone, so that the verifier repeats it.
+//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid, bodies. All of them are
+//! linear in the displacements and follow from the reference alone, so that the verifier repeats them.
 
 use crate::{
     bodies::Bodies,
@@ -13,16 +13,16 @@ use crate::{
 /// The constraints of a map.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Constraints {
-    /// T-junctions, but for vertices of bodies: those never hang.
+    /// T-junctions without those of vertices of bodies, which never hang.
     pub junctions: Junctions,
     /// Polygons that move as one.
     pub bodies: Bodies,
-    /// All vertices that lie on segments, and those.
+    /// All vertices that lie on segments, each with its segment.
     pub(crate) touching: Vec<Touching>,
 }
 
 impl Constraints {
-    /// Finds them; `tree` holds all vertices.
+    /// Finds the constraints of a map; `tree` holds all its vertices.
     pub(crate) fn find(map: &Map, tree: &VertexTree, shape: Rigidity) -> Self {
         let mut touches = touches(map, tree);
         let bodies = match shape {

@@ -1,10 +1,10 @@
-//! What happened to the suspect besides the mark, estimated without the key: a smooth deformation (rubber
-//! sheeting, digitising, a projection guessed wrong) and noise. In GIS words, kriging of the displacements.
+//! The disturbance of the suspect besides the mark, estimated without the key: a smooth deformation (rubber
+//! sheeting, digitising, a wrong projection) and noise. The method is kriging of the displacements.
 //!
-//! The displacement of a vertex is deformation + mark + noise. The deformation is a Gaussian process
-//! with a Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine Learning*,
-//! 2006, eq. 4.17) and a free shift of every patch. Nothing here knows the chips: the tested key and every
-//! decoy see the same estimate.
+//! The displacement of a vertex is deformation + mark + noise. The deformation is a Gaussian process with a
+//! Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 4.17)
+//! and a free shift of every patch. The estimate does not depend on the chips: it is the same for the tested
+//! key and for every decoy.
 
 use crate::{
     Result,
@@ -26,22 +26,23 @@ use rayon::prelude::*;
 /// Displacement of every reference vertex in canonical order, metres, or `None` where it was not found.
 pub type Observed = [Option<[f64; 2]>];
 
-/// Standard deviation of the shift of a whole patch, metres: as good as free.
+/// Standard deviation of the shift of a whole patch, metres; the shift is practically free.
 const SHIFT_M: f64 = 1.0;
 /// No displacement is trusted to better than this, metres.
 pub(crate) const LEAST_NOISE_M: f64 = 0.01;
-/// Patches, and vertices of each, on which the hyper-parameters are estimated.
+/// Numbers of patches, and of vertices in each, from which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
 const SAMPLE_VERTICES: usize = 200;
-/// Fewer found vertices say nothing about a patch.
+/// Fewer found vertices carry no information about a patch.
 const LEAST_FOUND: usize = 30;
 /// A residual of more standard deviations than this weighs less (Huber 1964).
 const HUBER: f64 = 2.0;
 /// A residual of more standard deviations than this is no displacement of the vertex at all.
 const OUTLIER: f64 = 4.0;
-/// The law of the noise is read from residuals, which show it only when it is this many times the mark.
+/// The law of the noise is estimated from residuals, which show it only where the noise is this many times
+/// the mark.
 const WEAK_MARK: f64 = 1.5;
-/// What a deformation must gain in log-likelihood to be believed.
+/// A deformation is accepted when it raises the log-likelihood by this much.
 const WORTH_IT: f64 = 10.0;
 
 const DEVIATIONS_M: [f64; 6] = [0.06, 0.12, 0.25, 0.5, 1.0, 2.0];
@@ -59,21 +60,21 @@ pub struct Deformation {
     pub noise_m: f64,
 }
 
-/// The deformation itself.
+/// A predicted deformation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
     /// Its hyper-parameters.
     pub deformation: Deformation,
-    /// Of every reference vertex in canonical order, found or not, metres.
+    /// The deformation at every reference vertex in canonical order, found or not, metres.
     pub displacement_m: Vec<[f64; 2]>,
-    /// Of every reference vertex: 1, or less where its displacement does not fit in with the others.
+    /// The weight of every reference vertex: 1, or less where its displacement disagrees with the others.
     pub weights: Vec<f64>,
 }
 
 impl Prediction {
-    /// `observed` without the displacements that are no part of either deformation, mark or noise: vertices that
-    /// a cut or an edit made where no reference vertex went. The scale is the median of what the deformation
-    /// leaves, which a few of them do not move, and at least the mark's own.
+    /// Removes from `observed` the displacements that are neither deformation nor mark nor noise: those of
+    /// vertices that a cut or an edit made where no reference vertex went. The scale is the median residual,
+    /// which a few such vertices do not change, and at least that of the mark.
     pub fn without_outliers(&self, observed: &Observed, mark_m: f64) -> Vec<Option<[f64; 2]>> {
         let rest =
             |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [(o[0] - f[0]).abs(), (o[1] - f[1]).abs()]);
@@ -89,8 +90,8 @@ impl Prediction {
         observed.iter().zip(&rests).map(|(o, r)| o.filter(|_| fits(r))).collect()
     }
 
-    /// What to demodulate in place of `observed`: what the deformation leaves of every displacement goes
-    /// through the [`NoiseLaw`] that fits, and the noise becomes as small as that makes it.
+    /// Returns what to demodulate in place of `observed`: the residual of every displacement is transformed
+    /// by the fitted [`NoiseLaw`], and the noise is that of the transformed residuals.
     pub fn shape_noise(
         mut self,
         patches: &Patches,
@@ -116,20 +117,22 @@ impl Prediction {
     }
 }
 
-/// The standard deviation of the mark's displacement on one axis, metres: unit columns of E spread over n rows.
+/// Returns the standard deviation of the mark's displacement on one axis, metres: unit columns of E spread over
+/// n rows.
 pub fn mark_deviation_m(patches: &Patches, carriers: usize, amplitude_m: f64) -> f64 {
     let per_vertex = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
     amplitude_m * per_vertex.sqrt()
 }
 
 impl Deformation {
-    /// Noise alone.
+    /// Returns a disturbance of noise alone.
     pub fn none(noise_m: f64) -> Self {
         Deformation { deviation_m: 0.0, range_m: 1.0, noise_m }
     }
 
-    /// The hyper-parameters of greatest marginal likelihood on a few patches. The mark enters with its
-    /// covariance over all chips and messages, α² E Eᵀ. `carriers` is what [`Patches::carriers`] says.
+    /// Returns the hyper-parameters of greatest marginal likelihood on a few patches. The mark enters with
+    /// its covariance over all chips and messages, α² E Eᵀ. `carriers` is the result of
+    /// [`Patches::carriers`].
     ///
     /// # Errors
     /// [`crate::Error::NoConvergence`].
@@ -151,8 +154,8 @@ impl Deformation {
         }))
     }
 
-    /// Predicts the deformation from what was observed. The mark counts as noise here, so no spectrum
-    /// is needed.
+    /// Predicts the deformation from the observed displacements. The mark counts as noise here, so no
+    /// spectrum is needed.
     pub fn predict(
         &self,
         patches: &Patches,
@@ -182,14 +185,14 @@ impl Deformation {
         all
     }
 
-    /// σ_f² k(d / ℓ), Matérn 5/2.
+    /// Returns σ_f² k(d / ℓ), Matérn 5/2.
     fn covariance(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
         let d = (5.0 * ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2))).sqrt() / self.range_m;
         self.deviation_m.powi(2) * (1.0 + d + d * d / 3.0) * (-d).exp()
     }
 
-    /// Covariance of deformation, shift and noise over found vertices, o × o (its lower triangle: the
-    /// factorisation reads no more); weights divide the noise.
+    /// Returns the covariance of deformation, shift and noise over found vertices, o × o. Only its lower
+    /// triangle is filled, as the factorisation reads no more; weights divide the noise.
     fn matrix(&self, at: &[[f64; 2]], weights: &[f64]) -> Mat<f64> {
         Mat::from_fn(at.len(), at.len(), |i, j| {
             let noise = if i == j { self.noise_m.powi(2) / weights[i] } else { 0.0 };
@@ -199,11 +202,12 @@ impl Deformation {
     }
 }
 
-/// Covariance Σ of deformation, shift and noise over o found vertices, made ready to divide by.
+/// The covariance Σ of deformation, shift and noise over o found vertices, factored.
 pub(crate) enum Covariance {
     /// The Cholesky factor.
     Dense(Llt<f64>),
-    /// Without a deformation Σ = P⁻¹ + s² 1 1ᵀ with a diagonal P, these precisions, and nothing needs factoring.
+    /// Without a deformation Σ = P⁻¹ + s² 1 1ᵀ, where the diagonal P holds these precisions and needs no
+    /// factorisation.
     Shift(Vec<f64>),
 }
 
@@ -215,7 +219,7 @@ impl Covariance {
         Covariance::Shift(weights.iter().map(|w| w / deformation.noise_m.powi(2)).collect())
     }
 
-    /// A square root of Σ⁻¹ times the columns of a matrix with o rows.
+    /// Multiplies a square root of Σ⁻¹ by the columns of a matrix with o rows.
     pub fn whiten(&self, mut columns: Mat<f64>) -> Mat<f64> {
         match self {
             Covariance::Dense(factor) => {
@@ -236,7 +240,7 @@ impl Covariance {
         columns
     }
 
-    /// Σ⁻¹ times the columns of a matrix with o rows.
+    /// Multiplies Σ⁻¹ by the columns of a matrix with o rows.
     fn solve(&self, columns: &Mat<f64>) -> Mat<f64> {
         match self {
             Covariance::Dense(factor) => factor.solve(columns),
@@ -254,7 +258,7 @@ impl Covariance {
     }
 }
 
-/// The Cholesky factor of a covariance with noise.
+/// Returns the Cholesky factor of a covariance with noise.
 pub(crate) fn factor(covariance: &Mat<f64>) -> Llt<f64> {
     Llt::new(covariance.as_ref(), Side::Lower).expect("a covariance with noise is positive definite")
 }
@@ -299,7 +303,7 @@ struct PatchPrediction {
 }
 
 impl Kriging {
-    /// Alternates between the deformation and the weights of what does not fit it.
+    /// Alternates between estimating the deformation and reducing the weights of vertices that do not fit it.
     fn new(deformation: Deformation, found: Found) -> Self {
         let mut weights = vec![1.0; found.rows.len()];
         let mut solved = Mat::zeros(found.rows.len(), 2);
@@ -342,7 +346,7 @@ impl Kriging {
     }
 }
 
-/// One patch as the likelihood needs it.
+/// The data of one patch for the likelihood.
 struct Sample {
     at: Vec<[f64; 2]>,
     /// o × 2.
@@ -370,7 +374,7 @@ impl Sample {
         Ok(Sample { at: found.at, moved, mark })
     }
 
-    /// log p(y) of both axes, but for a constant.
+    /// Returns log p(y) of both axes without its constant.
     fn log_likelihood(&self, candidate: &Deformation) -> f64 {
         let count = self.at.len();
         let factor = factor(&(candidate.matrix(&self.at, &vec![1.0; count]) + &self.mark));
@@ -381,7 +385,7 @@ impl Sample {
     }
 }
 
-/// Coordinate ascent over the grid of values, with a deformation and without one.
+/// Finds the maximum by coordinate ascent over the grid of values, with a deformation and without one.
 fn most_likely(log_likelihood: impl Fn(&Deformation) -> f64) -> Deformation {
     let best_of = |candidates: &mut dyn Iterator<Item = Deformation>| {
         let scored = candidates.map(|candidate| (log_likelihood(&candidate), candidate));
@@ -423,7 +427,7 @@ mod tests {
         [0.8 * (x / 40.0).sin(), 0.8 * (y / 40.0).cos()]
     }
 
-    /// The wave at two vertices of three, with a centimetre of noise.
+    /// Returns the wave at two vertices of three, with a centimetre of noise.
     fn observed(patches: &Patches) -> Vec<Option<[f64; 2]>> {
         let noise = |i: usize| ((i * 7919) % 101) as f64 / 101.0 * 0.03 - 0.015;
         let each = patches.positions_m().iter().enumerate();
@@ -464,7 +468,7 @@ mod tests {
             white.transpose() * &white
         };
         assert!((gram(&quick) - gram(&dense)).norm_max() < 1e-9 * gram(&dense).norm_max());
-        // A smooth deformation without noise to speak of goes through what was observed.
+        // A smooth deformation with negligible noise interpolates the observed displacements.
         let smooth = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 1e-4 };
         let observed: Vec<_> = patches.positions_m().iter().map(|p| Some(wave(*p))).collect();
         let prediction = smooth.predict(&patches, &observed, 64, 0.0);

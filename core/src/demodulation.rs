@@ -1,8 +1,8 @@
-//! Demodulation: from observed displacements back to the message (paper, section 3.5, and ours).
+//! Demodulation: observed displacements become the message again (paper, section 3.5, and our extension).
 //!
-//! Both demodulators reduce a suspect to the same evidence: a correlation a_i with every chip. Under a
-//! wrong key the chips are independent random signs, so Σ p_i b′_i a_i has mean 0 and variance Σ a_i²
-//! *given the suspect*, whatever was done to it: [`Demodulation::mark_score`] needs no model of the attack.
+//! Both demodulators reduce a suspect to the same evidence: a correlation a_i with every chip. Under a wrong
+//! key the chips are independent random signs, so Σ p_i b′_i a_i has mean 0 and variance Σ a_i² *given the
+//! suspect*, whatever the attack: [`Demodulation::mark_score`] needs no model of it.
 
 use crate::{
     Result,
@@ -25,12 +25,12 @@ use rayon::prelude::*;
 /// Correlations with chips spread by this at least, metres.
 const LEAST_SPREAD_M: f64 = 1e-3;
 
-/// What a demodulator found out about the channel bits: those that the code makes of the message.
+/// What a demodulator found about the channel bits, which the code makes of the message.
 #[derive(Debug, Clone)]
 pub struct Demodulation {
     /// How the message became the channel bits.
     pub code: Code,
-    /// b̂_j, an estimate of ±1 for every channel bit; 0 is no idea.
+    /// b̂_j, an estimate of ±1 for every channel bit; 0 means no information.
     pub estimate: Vec<f64>,
     /// v_j, the variance of each.
     pub variance: Vec<f64>,
@@ -38,57 +38,58 @@ pub struct Demodulation {
     pub scores: Vec<f64>,
     /// a_i, the correlation with every chip before its sign: patches × 2 axes × carriers.
     pub chip_correlations: Vec<f64>,
-    /// What Σ p_i b′_i a_i is expected to be when the mark is there at its full amplitude.
+    /// The expected value of Σ p_i b′_i a_i for a mark of full amplitude.
     pub expected_sum: f64,
-    /// Standard deviation of what is neither mark nor explained, metres per axis.
+    /// Standard deviation of the unexplained displacement, metres per axis.
     pub noise_m: f64,
 }
 
 impl Demodulation {
-    /// Log-likelihood ratios of the channel bits, 2 b̂_j / v_j, natural logarithm, positive = 1.
+    /// Returns the log-likelihood ratios of the channel bits, 2 b̂_j / v_j, natural logarithm, positive = 1.
     pub fn log_likelihood_ratios(&self) -> Vec<f64> {
         self.estimate.iter().zip(&self.variance).map(|(b, v)| 2.0 * b / v).collect()
     }
 
-    /// The message, and how sure it is.
+    /// Decodes the message and its reliability.
     pub fn decode(&self) -> Decoded {
         self.code.decode(&self.log_likelihood_ratios())
     }
 
-    /// The most likely message.
+    /// Returns the most likely message.
     pub fn message(&self) -> Message {
         self.decode().message
     }
 
-    /// How many channel bits differ from those of this message.
+    /// Counts the channel bits that differ from those of this message.
     pub fn channel_bit_errors(&self, message: &Message) -> usize {
         let signs = self.code.encode(message);
         signs.iter().zip(&self.estimate).filter(|(sign, b)| (**sign > 0.0) != (**b > 0.0)).count()
     }
 
-    /// How many standard deviations the evidence for this message under this key is above that of a
+    /// Returns by how many standard deviations the evidence for this message under this key exceeds that of a
     /// random key on the same suspect.
     pub fn mark_score(&self, message: &Message) -> f64 {
         ratio(dot(&self.code.encode(message), &self.scores), self.null_deviation())
     }
 
-    /// The [`Self::mark_score`] a mark of full amplitude would be expected to show.
+    /// Returns the expected [`Self::mark_score`] of a mark of full amplitude.
     pub fn expected_mark_score(&self) -> f64 {
         ratio(self.expected_sum, self.null_deviation())
     }
 
-    /// How many standard deviations the estimate agrees better with this message than with a random
-    /// message under the same key: Σ w_j b′_j b̂_j / |w b̂| over channel bits, at most the square root of their number.
-    /// Its mean is 0 and its variance 1 with either code: the bits of a random LDPC code word are not all
-    /// independent, but any four of them are (its dual distance is more than 4, `code.rs` proves it). On a clean
-    /// copy all |b̂_j| are equal, and without the weights w_j the score would have few values, and the normal
-    /// law a tail up to 1.5 times too small at them.
+    /// Returns by how many standard deviations the estimate agrees better with this message than with a
+    /// random message under the same key: Σ w_j b′_j b̂_j / |w b̂| over channel bits, at most the square root
+    /// of their number. Its mean is 0 and its variance 1 with either code: the bits of a random LDPC code
+    /// word are not all independent, but any four of them are (a test in `code.rs` shows that the dual
+    /// distance is more than 4). On a clean copy all |b̂_j| are equal: without the weights w_j the score
+    /// would have few values, at which the tail of the normal law is up to 1.5 times too small.
     pub fn recipient_score(&self, message: &Message) -> f64 {
         let weighted: Vec<f64> = self.estimate.iter().enumerate().map(|(j, b)| spread(j) * b).collect();
         ratio(dot(&self.code.encode(message), &weighted), dot(&weighted, &weighted).sqrt())
     }
 
-    /// The [`Self::mark_score`] of each of `patches` patches by itself; `None` where nothing was observed to move.
+    /// Returns the [`Self::mark_score`] of each of `patches` patches alone; `None` where no displacement was
+    /// observed.
     pub fn patch_scores(&self, carrier: &Carrier, message: &Message, patches: usize) -> Vec<Option<f64>> {
         let signs = self.code.encode(message);
         let carriers = self.chip_correlations.len() / patches / 2;
@@ -108,8 +109,8 @@ impl Demodulation {
         self.chip_correlations.par_chunks(2 * carriers).enumerate().map(score).collect()
     }
 
-    /// The [`Self::mark_score`] of `count` decoy keys on the same suspect: random signs instead of chips, those
-    /// of decoy k from ChaCha20 stream k.
+    /// Returns the [`Self::mark_score`] of `count` decoy keys on the same suspect. Random signs replace the
+    /// chips; decoy k takes them from ChaCha20 stream k.
     pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
         let deviation = self.null_deviation();
         let score = |decoy: usize| {
@@ -125,8 +126,9 @@ impl Demodulation {
         (0..count).into_par_iter().map(score).collect()
     }
 
-    /// Σ_j q_j² / n_j with n_j = Σ a_i² over the chips of channel bit j, and the number of bits it runs over. For a key
-    /// that was not used it is chi-squared with so many degrees of freedom; any message raises it.
+    /// Returns Σ_j q_j² / n_j, where n_j = Σ a_i² over the chips of channel bit j, and the number of bits in
+    /// the sum. For a key that was not used the sum is chi-squared with that many degrees of freedom; any
+    /// message raises it.
     pub fn key_score(&self, chip_rate: usize) -> (f64, usize) {
         let bits = self.scores.len();
         let mut energy = vec![0.0; bits];
@@ -144,8 +146,9 @@ impl Demodulation {
     }
 }
 
-/// Weights between 3/4 and 5/4, as unlike as they can be (multiples of the golden ratio): their deviation of 0.14
-/// blurs the steps of 1/4 in which scores of LDPC code words differ, and costs 1 % of the score.
+/// Returns a weight between 3/4 and 5/4; multiples of the golden ratio keep the weights as different as
+/// possible. Their deviation of 0.14 blurs the steps of 1/4 between scores of LDPC code words and costs 1 %
+/// of the score.
 fn spread(j: usize) -> f64 {
     0.75 + 0.5 * ((j as f64 * 0.618_033_988_749_895).fract())
 }
@@ -158,7 +161,7 @@ fn ratio(a: f64, b: f64) -> f64 {
     if b > 0.0 { a / b } else { 0.0 }
 }
 
-/// The paper's detector: a vertex that is not found counts as not moved, the dual basis gives the
+/// Demodulates as the paper does: a vertex that is not found counts as unmoved, the dual basis gives the
 /// coefficients, and the chips of a bit are summed over axes and patches.
 ///
 /// `observed` holds the displacement of every reference vertex in canonical order, metres, or `None`;
@@ -183,7 +186,7 @@ pub fn paper(
             values
         };
         let correlations = [0, 1].map(|axis| basis.analyse(&filled(axis))[1..].to_vec());
-        // The share of coefficient i that the found vertices pass on: (E⁻¹)_io E_oi.
+        // The share of coefficient i that the found vertices transmit: (E⁻¹)_io E_oi.
         let share = |i: usize| {
             let seen = found.rows.iter().map(|&v| basis.degrees[v] * basis.vectors[(v, i)].powi(2));
             basis.norms_squared[i] * seen.sum::<f64>()
@@ -198,7 +201,8 @@ pub fn paper(
     Ok(paper_estimate(&job, sums))
 }
 
-/// b̂_j is q_j over what a whole mark would give, with the spread of the a_i around their mean size.
+/// Estimates b̂_j as q_j over its value for a complete mark, and its variance from the spread of the a_i
+/// around their mean size.
 fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     let gain = |j: usize| job.parameters.amplitude_m * sums.gram[(j, 0)];
     let estimate: Vec<f64> = (0..job.bits).map(|j| ratio(sums.scores[j], gain(j))).collect();
@@ -220,10 +224,10 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     }
 }
 
-/// The joint detector: all bits at once over the vertices that were found, y_o = S_o b + f_o + ε with signatures
-/// S = α E diag(p) C, a smooth deformation f and noise ε as `disturbance` describes them; vertices that were
-/// not found are erasures. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over patches and axes:
-/// b̂ = (G + I)⁻¹ h, v = diag (G + I)⁻¹.
+/// Demodulates all bits at once over the found vertices: y_o = S_o b + f_o + ε with signatures S = α E
+/// diag(p) C, and with the smooth deformation f and noise ε of `disturbance`. Vertices that were not found
+/// are erasures. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over patches and axes: b̂ = (G +
+/// I)⁻¹ h, v = diag (G + I)⁻¹.
 ///
 /// The other arguments and the errors are those of [`paper`].
 pub fn joint(
@@ -239,7 +243,7 @@ pub fn joint(
     joint_of(&job, disturbance)
 }
 
-/// The same, with the bases of the first patches in `solved`.
+/// Demodulates like [`joint`], with the bases of the first patches in `solved`.
 pub(crate) fn joint_solved(
     (patches, solved): (&Patches, &[Basis]),
     carrier: &Carrier,
@@ -283,7 +287,7 @@ fn joint_of(job: &Job, disturbance: &Prediction) -> Result<Demodulation> {
     })
 }
 
-/// (G + I)⁻¹ h and the diagonal of (G + I)⁻¹, of the lower triangle of G.
+/// Returns (G + I)⁻¹ h and the diagonal of (G + I)⁻¹, given the lower triangle of G.
 fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let m = gram.nrows();
     (0..m).for_each(|j| gram[(j, j)] += 1.0);
@@ -305,7 +309,7 @@ struct Job<'a> {
     progress: &'a (dyn Fn(usize) + Sync),
 }
 
-/// What the patches add up to.
+/// The sums over the patches.
 struct Sums {
     /// The lower triangle of m × m for [`joint`], m × 1 for [`paper`], of m channel bits.
     gram: Mat<f64>,
@@ -331,7 +335,7 @@ impl Sums {
         Sums { gram, scores, correlations: correlations.concat(), trace }
     }
 
-    /// What a patch of which nothing was found adds to the sums of [`joint`].
+    /// Returns what a patch without found vertices adds to the sums of [`joint`].
     fn nothing(job: &Job) -> Self {
         Sums {
             gram: Mat::zeros(job.bits, job.bits),
@@ -364,15 +368,16 @@ impl<'a> Job<'a> {
         Ok(Job { patches, solved: &[], carrier, observed, bits, carriers, parameters, progress })
     }
 
-    /// The bit of the i-th chip, counted from 0.
+    /// Returns the bit of the i-th chip, counted from 0.
     fn bit(&self, i: usize) -> usize {
         bit_of_coefficient(i + 1, self.parameters.chip_rate)
     }
 
-    /// The lower triangle of Cᵀ diag(p) K diag(p) C, m × m, from the kernel K of both axes, 2·m·c × 2·m·c.
+    /// Returns the lower triangle of Cᵀ diag(p) K diag(p) C, m × m, from the kernel K of both axes, 2·m·c ×
+    /// 2·m·c.
     fn fold(&self, kernel: &Kernel, chips: &[Vec<f64>; 2]) -> Mat<f64> {
         let mut gram = Mat::zeros(self.bits, self.bits);
-        // Two chips of one bit meet on the diagonal, once from either side of K's.
+        // Two chips of one bit meet on the diagonal, once from either side of the diagonal of K.
         let times = |i: usize, k: usize| if self.bit(i) == self.bit(k) { 2.0 } else { 1.0 };
         for (axes, lower) in &kernel.own {
             for k in 0..self.carriers {
@@ -394,9 +399,9 @@ impl<'a> Job<'a> {
         gram
     }
 
-    /// Sums `f(patch, basis, found vertices, chips)` over the patches. They are added up in blocks
-    /// whose size depends on the number of patches alone: the same sum for any number of threads,
-    /// without holding a matrix for every patch.
+    /// Sums `f(patch, basis, found vertices, chips)` over the patches. The size of the blocks in which they
+    /// are added depends on the number of patches alone, so the sum is the same for any number of threads,
+    /// and no matrix is held for every patch.
     fn sum_over_patches(
         &self,
         f: impl Fn(&Patch, &Basis, &Found, &[Vec<f64>; 2]) -> Sums + Sync,
@@ -453,7 +458,8 @@ mod tests {
         let message = Message::from_hex("a5").unwrap();
         let carrier = Carrier::new(&crate::key::SecretKey::from_bytes([3; 32]));
         let signs = message.signs();
-        // 8 bits of 2 chips: the first patch carries the mark, the second its opposite, of the third nothing was seen.
+        // 8 bits of 2 chips: the first patch carries the mark, the second its opposite, and no vertex of the
+        // third was found.
         let patch = |(patch, size): (usize, f64)| {
             let chips = [0, 1].map(|axis| carrier.chips(patch, axis, 16)).concat();
             chips.into_iter().enumerate().map(|(i, chip)| size * chip * signs[i % 16 / 2]).collect::<Vec<_>>()

@@ -1,13 +1,13 @@
-//! What marking does to a map, in figures.
+//! Figures of what marking does to a map.
 
 use crate::{map::Map, scale::Measure, vertices::VertexTable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// An angle is right, or kept, within this many degrees.
+/// An angle counts as right, or as kept, within this many degrees.
 const RIGHT_DEG: f64 = 1.0;
 
-/// Of many values; zeros for none.
+/// The spread of many values; zeros for none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs)] // the names say it
 pub struct Spread {
@@ -19,7 +19,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of these values, none of them NaN.
+    /// Summarises values, none of which is NaN.
     pub fn summarise(mut values: Vec<f64>) -> Self {
         values.par_sort_unstable_by(f64::total_cmp);
         let count = values.len().max(1) as f64;
@@ -63,7 +63,7 @@ pub struct Validity {
     pub invalid_before: usize,
     /// In the marked map.
     pub invalid_after: usize,
-    /// Those that were valid before.
+    /// Those that are valid in the reference.
     pub newly_invalid: usize,
 }
 
@@ -75,11 +75,11 @@ pub struct Overlaps {
     pub before: usize,
     /// In the marked map.
     pub after: usize,
-    /// Those that did not before, and have got more than a sliver in common.
+    /// Pairs that overlap by more than a sliver only in the marked map.
     pub new: usize,
     /// Their area, m².
     pub new_area_m2: f64,
-    /// Pairs that did not overlap before and do now, by a sliver.
+    /// Pairs that overlap only in the marked map, by a sliver.
     pub new_slivers: usize,
 }
 
@@ -96,7 +96,7 @@ pub struct Displacement {
 }
 
 impl Displacement {
-    /// From the vertices of a map to where they are now, in canonical order.
+    /// Measures the displacement of the vertices of a map to `moved`, in canonical order.
     pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], measure: &Measure) -> Self {
         let metres = |(from, to): (&[f64; 2], &[f64; 2])| {
             let [dx, dy] = measure.metres_between(*from, *to);
@@ -117,14 +117,14 @@ pub struct AngleChange {
     pub mean_change_deg: f64,
     /// 99th percentile, degrees.
     pub p99_change_deg: f64,
-    /// Those that were within 1° of a right one.
+    /// Those within 1° of a right angle in the reference.
     pub right_angles: usize,
     /// The share of these that changed by 1° at most; 1 when there is none.
     pub right_angles_kept: f64,
 }
 
 impl AngleChange {
-    /// Of the corners of a map.
+    /// Measures the change at the corners of a map.
     pub fn at(corners: &[Corner]) -> Self {
         let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
         let right: Vec<&Corner> = corners.iter().filter(|corner| is_right(corner.before_deg)).collect();
@@ -140,10 +140,10 @@ impl AngleChange {
     }
 }
 
-/// A vertex of a map at which two segments meet and no more.
+/// A vertex of a map at which exactly two segments meet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
-    /// Where it is before marking, CRS units.
+    /// Its place before marking, CRS units.
     pub at: [f64; 2],
     /// The angle between its segments, degrees from 0 to 360.
     pub before_deg: f64,
@@ -152,7 +152,8 @@ pub struct Corner {
 }
 
 impl Corner {
-    /// All of a map whose vertices are at `moved` after marking, but those with a segment that has no length.
+    /// Returns all corners of a map whose vertices are at `moved` after marking, without those at a segment
+    /// of no length.
     pub fn all(map: &Map, moved: &[[f64; 2]]) -> Vec<Self> {
         let mut ends: Vec<[u32; 2]> = map.segments.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
         ends.par_sort_unstable();
@@ -170,15 +171,15 @@ impl Corner {
         pairs.par_iter().filter_map(corner).collect()
     }
 
-    /// How far the angle turned, from 0 to 180.
+    /// Returns how far the angle turned, degrees from 0 to 180.
     pub fn change_deg(&self) -> f64 {
         let turned = (self.after_deg - self.before_deg).abs();
         turned.min(360.0 - turned)
     }
 }
 
-/// The angle from the way back to the way on, turning left, degrees from 0 to 360; `scale` is metres per unit.
-/// `None` where either has no length.
+/// Returns the angle from the segment back to the segment on, turning left, degrees from 0 to 360; `scale` is
+/// metres per unit. It is `None` where either segment has no length.
 fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Option<f64> {
     let direction = |p: [f64; 2]| {
         let [x, y] = [0, 1].map(|i| (p[i] - at[i]) * scale[i]);

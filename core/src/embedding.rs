@@ -32,19 +32,20 @@ pub struct Marked {
     pub angles: AngleChange,
     /// How many vertices hang on a segment and moved with it.
     pub junctions: usize,
-    /// How many vertices moved otherwise than the mark wanted, for the map to keep its topology.
+    /// How many vertices moved differently from the mark to keep the topology of the map.
     pub attenuated: usize,
 }
 
-/// So many patches are solved again to read the message back; only when it is not in them, all.
+/// The message is read back from this many patches, which are solved again; from all patches only if that
+/// fails.
 const READ_BACK_PATCHES: usize = 16;
 
-/// What the wanted displacements of a batch of messages may take, bytes: 16 for each vertex and message.
+/// The memory for the wanted displacements of a batch of messages, bytes: 16 for each vertex and message.
 const MOST_BATCH_BYTES: usize = 512 << 20;
 
-/// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch, T-junctions kept, nothing pushed through a
-/// segment, held within the tolerance and put on the output grid. The message is read back from the result
-/// before it is returned.
+/// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch. T-junctions stay, no vertex passes through a
+/// segment, and every vertex stays within the tolerance and on the output grid. The message is read back from
+/// the result before it is returned.
 ///
 /// # Errors
 /// Those of [`Embedding::new`] and [`Embedding::settle`].
@@ -54,7 +55,7 @@ pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Paramet
     embedding.settle(message, &wanted[0])
 }
 
-/// All of a marking that does not depend on the message.
+/// The part of a marking that does not depend on the message.
 pub struct Embedding<'a> {
     map: &'a Map<'a>,
     placement: Placement<'a>,
@@ -68,10 +69,9 @@ pub struct Embedding<'a> {
 }
 
 impl<'a> Embedding<'a> {
-    /// Meshes the map and cuts it into patches, for messages of so many bits.
+    /// Meshes the map and cuts it into patches, for messages of `bits` bits.
     ///
-    /// # Errors
-    /// Everything of [`Patches::new`], [`Patches::carriers`], and a PRECISION that is coarser than TOLERANCE.
+    /// # Errors Those of [`Patches::new`] and [`Patches::carriers`], and [`Error::PrecisionTooCoarse`].
     pub fn new(
         map: &'a Map<'a>,
         key: &SecretKey,
@@ -86,7 +86,8 @@ impl<'a> Embedding<'a> {
         Ok(Embedding { map, placement, tree, patches, bases, carrier, carriers, parameters })
     }
 
-    /// For many messages: the bases of the patches that each of them is read back from are solved for once, and kept.
+    /// Prepares for many messages: it solves once for the bases of the patches from which each message is
+    /// read back, and keeps them.
     ///
     /// # Errors
     /// A patch that cannot be solved.
@@ -97,18 +98,19 @@ impl<'a> Embedding<'a> {
         Ok(self)
     }
 
-    /// How many patches there are.
+    /// Returns how many patches there are.
     pub fn patches(&self) -> usize {
         self.patches.as_slice().len()
     }
 
-    /// How many messages [`Self::wanted`] may be asked for at once within the memory for it, at least one.
+    /// Returns how many messages, at least one, [`Self::wanted`] handles at once within its memory.
     pub fn batch(&self) -> usize {
         (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * self.map.vertices.len())).max(1)
     }
 
-    /// The displacements that are the marks, for every message those of all vertices, CRS units. Every patch is
-    /// solved once for all of them, and its basis is not kept. `progress` is called once for every patch.
+    /// Returns the displacements that are the marks, for every message those of all vertices, CRS units.
+    /// Every patch is solved once for all messages, and its basis is not kept. `progress` is called once for
+    /// every patch.
     ///
     /// # Errors
     /// A patch that cannot be solved.
@@ -119,7 +121,7 @@ impl<'a> Embedding<'a> {
     ) -> Result<Vec<Vec<[f64; 2]>>> {
         let signs: Vec<Vec<f64>> = messages.iter().map(|m| self.parameters.code.encode(m)).collect();
         let all = self.patches.as_slice();
-        // In blocks, so that the displacements of few patches are held twice.
+        // Blocks bound the displacements that are held twice.
         let block = 64 * rayon::current_num_threads();
         let mut wanted = vec![vec![[0.0; 2]; self.map.vertices.len()]; messages.len()];
         for (first, patches) in (0..all.len()).step_by(block).zip(all.chunks(block)) {
@@ -140,7 +142,7 @@ impl<'a> Embedding<'a> {
         Ok(wanted)
     }
 
-    /// The displacements of the vertices of a patch for every message's signs b′, CRS units.
+    /// Returns the displacements of the vertices of a patch for the signs b′ of every message, CRS units.
     fn wanted_of_patch(
         &self,
         number: usize,
@@ -168,7 +170,7 @@ impl<'a> Embedding<'a> {
         Ok(signs.iter().map(of_message).collect())
     }
 
-    /// The map marked with a message, of which `wanted` are the displacements.
+    /// Marks the map with a message; `wanted` are its displacements.
     ///
     /// # Errors
     /// [`Error::MessageLost`].
@@ -190,7 +192,8 @@ impl<'a> Embedding<'a> {
         [0, 1].map(|axis| self.carrier.chips(patch, axis, self.carriers))
     }
 
-    /// The coefficients that modulate the message: 0 for the mean, then α p_i b′_j, amplified by `gain`.
+    /// Returns the coefficients that modulate the message: 0 for the mean, then α p_i b′_j, amplified by
+    /// `gain`.
     fn coefficients(&self, chips: &[f64], signs: &[f64], gain: f64) -> Vec<f64> {
         let chip_rate = self.parameters.chip_rate;
         let modulated = chips.iter().enumerate().map(|(i, chip)| {

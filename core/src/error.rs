@@ -4,7 +4,7 @@ use crate::{
 };
 use std::fmt;
 
-/// What can go wrong in the algorithm. Every message says what would have been legal.
+/// The errors of the algorithm. Every message states what would have been legal.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
@@ -43,7 +43,7 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {}
 
 impl Error {
-    /// The message, in which options are named as the user of this front end writes them.
+    /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
         let name = |option| spelling.name(option);
         match self {
@@ -139,7 +139,7 @@ fn too_few(vertices: usize, patch_size: usize, code: Code, chip_rate: usize, spe
             counted(vertices, "distinct vertex")
         );
     }
-    // One patch of all vertices has a coefficient less than vertices.
+    // One patch of all vertices has one coefficient less than it has vertices.
     let room = vertices - 1;
     let value = |option, value: usize| spelling.value(option, value);
     let (size, repetition) = (value("PATCH_SIZE", vertices), spelling.value("CODE", "REPETITION"));

@@ -1,9 +1,9 @@
-//! Metres on the ground: how far a CRS unit reaches at a place of the map.
+//! Metres on the ground: the size of a CRS unit at a place of the map.
 
 /// The size of a CRS unit on the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ground {
-    /// A projected CRS, or none: the same everywhere, measured at the map's centre.
+    /// A projected CRS, or none: the size is the same everywhere and measured at the map's centre.
     Plane {
         /// Metres on the ground per CRS unit.
         metres_per_unit: f64,
@@ -27,8 +27,9 @@ impl Ground {
         radians_per_unit: std::f64::consts::PI / 180.0,
     };
 
-    /// Metres per CRS unit along x and y at `point`: on the ellipsoid the radii of curvature of the
-    /// parallel (N cos φ) and of the meridian (M) (Snyder, *Map Projections*, 1987, eq. 4-18 to 4-20).
+    /// Returns metres per CRS unit along x and y at `point`. On the ellipsoid they follow from the radii of
+    /// curvature of the parallel (N cos φ) and of the meridian (M) (Snyder, *Map Projections*, 1987, eq. 4-18
+    /// to 4-20).
     pub fn metres_per_unit(&self, point: [f64; 2]) -> [f64; 2] {
         match *self {
             Ground::Plane { metres_per_unit } => [metres_per_unit; 2],
@@ -43,8 +44,8 @@ impl Ground {
         }
     }
 
-    /// Where a point of the ellipsoid is in space, metres from its centre (geocentric coordinates, EPSG method 9602);
-    /// `None` in a plane. Unlike degrees, these do not jump at the 180th meridian or turn about the poles.
+    /// Returns the geocentric coordinates of a point of the ellipsoid, metres (EPSG method 9602); `None` in a
+    /// plane. Unlike degrees, they are continuous across the 180th meridian and at the poles.
     pub fn in_space(&self, point: [f64; 2]) -> Option<[f64; 3]> {
         let Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } = *self else {
             return None;
@@ -56,14 +57,14 @@ impl Ground {
         Some([normal * cos_lat * cos_lon, normal * cos_lat * sin_lon, normal * (1.0 - e2) * sin_lat])
     }
 
-    /// The vector from `a` to `b` (CRS units) in metres, measured at `a`.
+    /// Returns the vector from `a` to `b` (CRS units) in metres, measured at `a`.
     pub fn metres_between(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let [mx, my] = self.metres_per_unit(a);
         [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
     }
 
-    /// The factor on x that makes mesh coordinates of about equal scale: 1, or the cosine of the
-    /// map's middle latitude, rounded to 2⁻²⁰ so that every machine meshes the very same numbers.
+    /// Returns the factor on x that makes both axes of the mesh coordinates about equal in scale: 1, or the
+    /// cosine of the map's middle latitude, rounded to 2⁻²⁰ so that every machine meshes the same numbers.
     pub fn x_scale(&self, middle_y: f64) -> f64 {
         match self {
             Ground::Plane { .. } => 1.0,
@@ -74,8 +75,8 @@ impl Ground {
         }
     }
 
-    /// Whether `point` must stay where it is: within `tolerance_m` of ±180° or ±90°, where a shift
-    /// would leave the legal range or tear a map apart at its seam.
+    /// Returns whether `point` must stay in place: within `tolerance_m` of ±180° or ±90° a shift would leave
+    /// the legal range or tear a map apart at its seam.
     pub fn is_pinned(&self, point: [f64; 2], tolerance_m: f64) -> bool {
         let Ground::Ellipsoid { radians_per_unit, .. } = self else { return false };
         let [mx, my] = self.metres_per_unit(point);
@@ -92,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_degree_has_its_textbook_length() {
-        // Snyder 1987, table 2 is for Clarke 1866; these are WGS 84: 110.574 km at 0°, 111.694 km at 90°.
+        // Table 2 of Snyder 1987 holds for Clarke 1866; WGS 84 has 110.574 km at 0°, 111.694 km at 90°.
         let [x0, y0] = Ground::WGS84.metres_per_unit([10.0, 0.0]);
         let [x90, y90] = Ground::WGS84.metres_per_unit([10.0, 90.0]);
         assert!((x0 - 111_319.49).abs() < 0.01 && (y0 - 110_574.28).abs() < 0.01);

@@ -1,13 +1,13 @@
 //! Bytes as hexadecimal digits.
 
-/// Two lower-case digits for each byte.
+/// Encodes each byte as two lower-case digits.
 pub fn encode(bytes: &[u8]) -> String {
     let digit = |nibble: u8| char::from_digit(nibble.into(), 16).expect("four bits are a digit");
     bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }
 
-/// Writes the bytes of `text` to `bytes` and makes no other copy of them; `None` unless the digits, in either case,
-/// are as many as the bytes need.
+/// Decodes `text`, in either case, into `bytes` and makes no other copy; returns `None` unless the text is
+/// exactly the digits of that many bytes.
 pub(crate) fn decode_into(text: &str, bytes: &mut [u8]) -> Option<()> {
     if text.len() != 2 * bytes.len() {
         return None;

@@ -1,8 +1,8 @@
-//! T-junctions: a vertex on a segment that it is no end of hangs there and moves with it.
+//! T-junctions: a vertex inside a segment hangs on it and moves with it.
 //!
-//! The constraint is linear, Δ_v = (1 − s) Δ_a + s Δ_b at the foot s of vertex v on segment ab, and depends on the
-//! reference alone: the verifier repeats it, and nothing of the mark is lost. (In finite elements such a
-//! vertex is a hanging node.)
+//! The constraint is linear, Δ_v = (1 − s) Δ_a + s Δ_b at the foot s of vertex v on segment ab, and depends
+//! on the reference alone: the verifier repeats it, and no part of the mark is lost. (The finite element
+//! method calls such a vertex a hanging node.)
 
 use crate::{
     map::Map,
@@ -11,11 +11,11 @@ use crate::{
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// A vertex that is no further from a segment lies on it, metres on the ground: coordinates that were rounded do
-/// not meet the segment exactly.
+/// A vertex within this distance of a segment lies on it, metres on the ground: rounded coordinates do not
+/// meet the segment exactly.
 pub const JUNCTION_M: f64 = 0.02;
 
-/// What a hanging vertex keeps of its own movement at most; more, and it hangs on nothing but itself.
+/// A hanging vertex keeps at most this share of its own movement; with more it hangs only on itself.
 const OWN_SHARE: f64 = 1.0 - 1e-6;
 
 /// A vertex that moves as the weighted mean of others.
@@ -23,7 +23,7 @@ const OWN_SHARE: f64 = 1.0 - 1e-6;
 pub struct Hanging {
     /// Its canonical index.
     pub vertex: u32,
-    /// Vertices that hang nowhere, ascending, with positive weights that add up to 1.
+    /// The free vertices it hangs on, ascending, with positive weights that add up to 1.
     pub anchors: Vec<(u32, f64)>,
 }
 
@@ -34,25 +34,26 @@ pub struct Junctions {
 }
 
 impl Junctions {
-    /// Hangs vertices on segments. One that lies on several hangs on the nearest (of equally near ones, the
-    /// first); its displacement is resolved to vertices that hang nowhere.
+    /// Hangs vertices on segments. A vertex on several segments hangs on the nearest one (the first of
+    /// equally near ones); its displacement is resolved to free vertices.
     pub(crate) fn new(mut touches: Vec<Touch>) -> Self {
         touches.par_sort_unstable_by(Touch::order);
         touches.dedup_by_key(|touch| touch.vertex);
         Junctions { hanging: resolve(touches) }
     }
 
-    /// The hanging vertices, ascending.
+    /// Returns the hanging vertices, ascending.
     pub fn hanging(&self) -> &[Hanging] {
         &self.hanging
     }
 
-    /// What a vertex hangs on, if it does.
+    /// Returns what a vertex hangs on, if it hangs.
     pub fn hanging_at(&self, vertex: u32) -> Option<&Hanging> {
         self.hanging.binary_search_by_key(&vertex, |h| h.vertex).ok().map(|i| &self.hanging[i])
     }
 
-    /// Lets the hanging vertices follow: `displacements` of all vertices, in CRS units.
+    /// Moves the hanging vertices along with their anchors; `displacements` are those of all vertices, CRS
+    /// units.
     pub fn follow(&self, displacements: &mut [[f64; 2]]) {
         for Hanging { vertex, anchors } in &self.hanging {
             displacements[*vertex as usize] = anchors.iter().fold([0.0; 2], |sum, &(anchor, weight)| {
@@ -78,7 +79,7 @@ impl Touch {
     }
 }
 
-/// All vertices on segments; `tree` holds all vertices.
+/// Finds all vertices on segments; `tree` holds all vertices.
 pub(crate) fn touches(map: &Map, tree: &VertexTree) -> Vec<Touch> {
     map.segments.par_iter().flat_map_iter(|&segment| touches_of(map, tree, segment)).collect()
 }
@@ -95,7 +96,7 @@ fn touches_of(map: &Map, tree: &VertexTree, segment: [u32; 2]) -> Vec<Touch> {
     tree.around(segment, reach).filter_map(touch).collect()
 }
 
-/// [`JUNCTION_M`] in CRS units, not less than at any vertex near the segment.
+/// Returns [`JUNCTION_M`] in CRS units, at least as much as at any vertex near the segment.
 fn reach(map: &Map, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let (p, q) = (map.ground.metres_per_unit(a), map.ground.metres_per_unit(b));
     [0, 1].map(|axis| 1.01 * JUNCTION_M / p[axis].min(q[axis]).max(1e-3))
@@ -103,8 +104,9 @@ fn reach(map: &Map, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 
 type Row = BTreeMap<u32, f64>;
 
-/// Hanging vertices may hang on hanging vertices, and on each other (a wall that two houses share with other
-/// vertices on either side). Gaussian elimination in canonical order leaves only vertices that hang nowhere.
+/// Resolves hanging vertices that hang on hanging vertices, or on each other (on a wall that two houses share
+/// with different vertices on either side). Gaussian elimination in canonical order leaves only free
+/// vertices.
 fn resolve(touches: Vec<Touch>) -> Vec<Hanging> {
     let mut rows: BTreeMap<u32, Row> = BTreeMap::new(); // in terms of later hanging vertices and of free ones
     for Touch { vertex, segment: [a, b], share, .. } in touches {
@@ -138,7 +140,7 @@ fn add(row: &mut Row, vertex: u32, weight: f64) {
     *row.entry(vertex).or_insert(0.0) += weight;
 }
 
-/// Replaces the vertices that `row_of` knows, and those that come in with their rows.
+/// Replaces the vertices for which `row_of` has a row, and those that these rows bring in.
 fn substitute<'a>(row: &mut Row, row_of: impl Fn(u32) -> Option<&'a Row>) {
     while let Some((vertex, known)) = row.keys().find_map(|&vertex| Some((vertex, row_of(vertex)?))) {
         let weight = row.remove(&vertex).expect("it is a key");
@@ -151,7 +153,7 @@ mod tests {
     use super::*;
     use crate::{ground::Ground, vertices::VertexTable};
 
-    /// The junctions of segments between points, whose canonical indices must be their places.
+    /// Returns the junctions of segments between points, whose canonical indices must be their places.
     fn junctions(points: &[[f64; 2]], segments: &[[u32; 2]]) -> Vec<Hanging> {
         let vertices = VertexTable::new(points.to_vec()).unwrap();
         assert_eq!(vertices.coords(), points);

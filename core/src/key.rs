@@ -1,4 +1,4 @@
-//! The secret key k_w and what is derived from it.
+//! The secret key k_w and its derived values.
 
 pub use crate::options::RECIPIENT_BITS;
 
@@ -11,15 +11,14 @@ use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
 
 const VERSION: u32 = 1;
 
-/// A key file has 150 bytes, and few records have a thousand times as many; a mistaken /dev/zero has no end.
+/// A key file has 150 bytes and a record a few thousand; a mistaken /dev/zero has no end.
 const LONGEST_TEXT: u64 = 1 << 20;
-/// So much is reserved for a text, that no copies of a secret are left where it would have to grow.
+/// This many bytes are reserved for a text: a buffer that grows would leave copies of a secret behind.
 const USUAL_TEXT: usize = 1024;
 
-/// The text of a key file or a record.
+/// Reads the text of a key file or a record.
 ///
-/// # Errors
-/// Those of `source`, bytes that are not UTF-8, more than 1 MiB.
+/// # Errors Fails when `source` fails, on bytes that are not UTF-8, and on more than 1 MiB.
 pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     let mut text = Zeroizing::new(String::with_capacity(USUAL_TEXT));
     source.take(LONGEST_TEXT + 1).read_to_string(&mut text)?;
@@ -31,7 +30,7 @@ pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     }
 }
 
-/// A 256-bit secret. It never prints itself and is wiped from memory when dropped.
+/// A 256-bit secret. `Debug` does not show it, and it is wiped from memory when dropped.
 #[derive(Clone, Zeroize, ZeroizeOnDrop)]
 pub struct SecretKey([u8; 32]);
 
@@ -47,7 +46,7 @@ struct KeyFile {
 }
 
 impl SecretKey {
-    /// The key with these 32 secret bytes; take them from the operating system's generator.
+    /// Creates the key with these 32 secret bytes, which must come from the operating system's generator.
     pub fn from_bytes(secret: [u8; 32]) -> Self {
         SecretKey(secret)
     }
@@ -59,7 +58,7 @@ impl SecretKey {
     /// secret. The message never holds the secret.
     pub fn from_json(text: &str) -> Result<Self> {
         let malformed = |reason: &str| Error::Key(reason.to_string());
-        // serde's own messages may quote values of the file, so they are not passed on.
+        // The messages of serde may quote values of the file, so they are not shown.
         let file: KeyFile = serde_json::from_str(text)
             .map_err(|_| malformed("it is not JSON with exactly the fields meshmark_key, id and secret"))?;
         if file.meshmark_key != VERSION {
@@ -75,23 +74,24 @@ impl SecretKey {
         Ok(key)
     }
 
-    /// The text of a key file.
+    /// Returns the text of a key file.
     pub fn to_json(&self) -> Zeroizing<String> {
         let file = KeyFile { meshmark_key: VERSION, id: self.id(), secret: hex::encode(&self.0) };
         Zeroizing::new(serde_json::to_string_pretty(&file).expect("strings are JSON") + "\n")
     }
 
-    /// The public name of the key: 64 bits of a keyed hash, in hexadecimal.
+    /// Returns the public name of the key: 64 bits of a keyed hash, in hexadecimal.
     pub fn id(&self) -> String {
         hex::encode(&self.derive("key id", b"")[..8])
     }
 
-    /// The message of a recipient: [`RECIPIENT_BITS`] of a keyed hash of the text.
+    /// Returns the message of a recipient: [`RECIPIENT_BITS`] of a keyed hash of the text.
     pub fn recipient_message(&self, recipient: &str) -> Message {
         Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..RECIPIENT_BITS / 8])
     }
 
-    /// As many key-dependent bits as `half` has, for a round of the whitening of messages of so many bits.
+    /// Returns as many key-dependent bits as `half` has, for one round of the whitening of messages of
+    /// `message_bits` bits.
     pub(crate) fn round_bits(&self, message_bits: usize, round: u8, half: &[bool]) -> Vec<bool> {
         const BITS: usize = 256; // of one HMAC
         let half_bytes: Vec<u8> = half.iter().map(|bit| u8::from(*bit)).collect();
@@ -103,12 +103,13 @@ impl SecretKey {
         (0..half.len().div_ceil(BITS)).flat_map(block).take(half.len()).collect()
     }
 
-    /// The seed of the chip streams.
+    /// Returns the seed of the chip streams.
     pub(crate) fn chip_seed(&self) -> [u8; 32] {
         self.derive("chips", b"")
     }
 
-    /// HMAC-SHA-256 (FIPS 198-1) of a purpose and a text, so that no use of the key tells of another.
+    /// Returns the HMAC-SHA-256 (FIPS 198-1) of a purpose and a text, so that one use of the key reveals
+    /// nothing about another.
     fn derive(&self, purpose: &str, text: &[u8]) -> [u8; 32] {
         let mut mac = Hmac::<Sha256>::new_from_slice(&self.0).expect("HMAC takes any key length");
         mac.update(b"meshmark v1 ");

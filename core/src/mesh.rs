@@ -18,9 +18,8 @@ impl Mesh {
     /// # Errors
     /// [`Error::Collinear`] when no triangle exists.
     ///
-    /// # Panics
-    /// When a coordinate is not finite or there are 2³² points; [`crate::vertices::VertexTable`]
-    /// lets neither through.
+    /// # Panics Panics when a coordinate is not finite or there are 2³² points, which
+    /// [`crate::vertices::VertexTable`] excludes.
     pub fn delaunay(points: &[[f64; 2]]) -> Result<Self> {
         let points: Vec<_> = points.iter().map(|&[x, y]| mitigate_underflow(Point2::new(x, y))).collect();
         if all_collinear(&points) {
@@ -45,20 +44,20 @@ impl Mesh {
         Ok(Mesh { edges, triangles })
     }
 
-    /// Edges as pairs of vertex indices `[i, j]`, i < j, sorted.
+    /// Returns the edges as sorted pairs of vertex indices `[i, j]`, i < j.
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.edges
     }
 
-    /// Triangles as their corners, counter-clockwise, in no order to rely on.
+    /// Returns the corners of the triangles, counter-clockwise; the order of the triangles is unspecified.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 }
 
-/// From the triangulation's vertices to our numbers. They are the same unless two distinct vertices
-/// became one when the local origin was subtracted; then the mesh holds the first of them, and the
-/// other one is joined to its patch by the bridging rule of [`crate::patches`].
+/// Maps the vertices of the triangulation to indices of points. These are the same unless two distinct
+/// vertices became one when the local origin was subtracted; then the mesh holds the first of them, and the
+/// bridging rule of [`crate::patches`] joins the other one to its patch.
 enum Numbering {
     Same,
     ByPosition(HashMap<[u64; 2], u32>),
@@ -88,8 +87,8 @@ fn bits(Point2 { x, y }: Point2<f64>) -> [u64; 2] {
     [(x + 0.0).to_bits(), (y + 0.0).to_bits()]
 }
 
-/// Whether no three points span a triangle, by an exact predicate. The first and the last point
-/// in canonical order are the ends of the line, if there is one.
+/// Returns whether no three points span a triangle, by an exact predicate. If all points lie on a line, the
+/// first and the last one in canonical order are its ends.
 fn all_collinear(points: &[Point2<f64>]) -> bool {
     let place = |p: &Point2<f64>| [p.x, p.y];
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return true };

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 
-/// Fewer bits, read without an error, agree by chance more often than once in a million times.
+/// Fewer bits without an error agree by chance more often than once in a million times.
 pub const LEAST_IDENTIFYING_BITS: usize = 24;
 /// So many leave room for several messages that are tried: the best p-value of 24 bits is near the default significance.
 pub const ADVISED_BITS: usize = 32;
@@ -29,54 +29,53 @@ impl Message {
         Ok(Message { bits })
     }
 
-    /// The message of these bytes, 8 bits each.
+    /// Creates the message of these bytes, 8 bits each.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         let bits = bytes.iter().flat_map(|b| (0..8).rev().map(move |i| b >> i & 1 == 1)).collect();
         Message { bits }
     }
 
-    /// The message of these bits, a multiple of four.
+    /// Creates the message of these bits, a multiple of four.
     pub(crate) fn from_bits(bits: Vec<bool>) -> Self {
         Message { bits }
     }
 
-    /// The message whose bit j is 1 where `values[j]` is positive.
+    /// Creates the message whose bit j is 1 where `values[j]` is positive.
     pub fn from_signs(values: &[f64]) -> Self {
         Message { bits: values.iter().map(|v| *v > 0.0).collect() }
     }
 
-    /// The bits.
+    /// Returns the bits.
     pub fn bits(&self) -> &[bool] {
         &self.bits
     }
 
-    /// The bits as ±1: b′_j = +1 for 1, −1 for 0.
+    /// Returns the bits as ±1: b′_j = +1 for 1, −1 for 0.
     pub fn signs(&self) -> Vec<f64> {
         self.bits.iter().map(|b| if *b { 1.0 } else { -1.0 }).collect()
     }
 
-    /// m, the number of bits.
+    /// Returns m, the number of bits.
     #[allow(clippy::len_without_is_empty)] // a message is never empty
     pub fn len(&self) -> usize {
         self.bits.len()
     }
 
-    /// How many bits differ from `other`, which has as many.
+    /// Counts the bits that differ from those of `other`, which has the same length.
     pub fn errors(&self, other: &Message) -> usize {
         self.bits.iter().zip(&other.bits).filter(|(a, b)| a != b).count()
     }
 
-    /// The same but for one bit.
+    /// Returns the message with one bit flipped.
     ///
-    /// # Panics
-    /// There is no such bit.
+    /// # Panics Panics when there is no such bit.
     pub fn with_flipped(&self, bit: usize) -> Self {
         let mut flipped = self.clone();
         flipped.bits[bit] = !flipped.bits[bit];
         flipped
     }
 
-    /// Lower-case hexadecimal digits.
+    /// Returns the message as lower-case hexadecimal digits.
     pub fn to_hex(&self) -> String {
         let digit = |bits: &[bool]| bits.iter().fold(0, |value, bit| value << 1 | u32::from(*bit));
         self.bits.chunks(4).filter_map(|bits| char::from_digit(digit(bits), 16)).collect()

@@ -1,30 +1,30 @@
-//! Whether a vertex and a segment keep their places relative to each other while both move in a straight line from
-//! the old coordinates to the new ones (continuous collision detection).
+//! Continuous collision detection: it decides whether a vertex and a segment keep their relative places while
+//! both move in a straight line from the old coordinates to the new ones.
 //!
-//! Topology of an arrangement of segments changes only where a vertex meets a segment. If no vertex does on the
-//! way, nothing crosses that did not, and what lay on one side of a segment lies there still.
+//! The topology of an arrangement of segments changes only where a vertex meets a segment. If no vertex does
+//! on the way, no new crossing appears, and every vertex stays on its side of every segment.
 
 use crate::nearness::{cross, dot, metres, nearest};
 
-/// Closer than this, a vertex touches a segment.
+/// A vertex closer than this touches a segment.
 const TOUCH_M: f64 = 1e-6;
-/// A gap is left at least so wide, or half as wide as it was.
+/// A gap stays at least this wide, or half as wide as it was.
 const LEAST_GAP_M: f64 = 1e-4;
-/// What rounding to 64-bit numbers may add, besides the last digits of the coordinates themselves.
+/// Rounding to 64-bit numbers adds at most this much, besides the last digits of the coordinates themselves.
 const ROUNDING_M: f64 = 1e-8;
 
-/// What may change between what touches.
+/// How far a vertex and a segment that touch may move against each other.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slack {
     /// A vertex within this distance of a segment touches it, metres.
     touch_m: f64,
-    /// By so much the two may move against each other then, metres.
+    /// The two may then move against each other by this much, metres.
     shift_m: f64,
 }
 
 impl Slack {
-    /// `digit_m` is what the last digit of a 64-bit coordinate is worth. On a grid of `grid_m` metres T-junctions
-    /// hold within one step.
+    /// Derives the slack from the size `digit_m` of the last digit of a 64-bit coordinate. On a grid of
+    /// `grid_m` metres T-junctions hold within one step.
     pub fn new(digit_m: f64, grid_m: f64, junction_m: f64) -> Self {
         match grid_m {
             0.0 => Slack { touch_m: TOUCH_M, shift_m: ROUNDING_M + 4.0 * digit_m },
@@ -36,7 +36,8 @@ impl Slack {
 /// A vertex and the two ends of a segment, CRS units.
 pub(crate) type Triple = [[f64; 2]; 3];
 
-/// Whether they keep their relative places from `before` to `after`; `scale` is metres per unit.
+/// Returns whether vertex and segment keep their relative places from `before` to `after`; `scale` is metres
+/// per unit.
 pub(crate) fn keeps_apart(before: &Triple, after: &Triple, scale: [f64; 2], slack: Slack) -> bool {
     let [vertex, a, b] = *before;
     let (p, e) = (metres(a, vertex, scale), metres(a, b, scale));
@@ -56,8 +57,9 @@ pub(crate) fn keeps_apart(before: &Triple, after: &Triple, scale: [f64; 2], slac
     nearest(plus(p, dp), plus(e, de)).0 >= least_gap * least_gap && !meets(p, e, dp, de, least_gap)
 }
 
-/// Whether the point p + t dp comes onto the segment from 0 to e + t de for a t from 0 to 1: their cross product
-/// is a polynomial of degree two in t. What moves along its own line counts as meeting.
+/// Returns whether the point p + t dp meets the segment from 0 to e + t de for some t from 0 to 1: their
+/// cross product is a polynomial of degree two in t. A point that moves along the line of the segment counts
+/// as meeting it.
 fn meets(p: [f64; 2], e: [f64; 2], dp: [f64; 2], de: [f64; 2], pad_m: f64) -> bool {
     let (c, b, a) = (cross(e, p), cross(e, dp) + cross(de, p), cross(de, dp));
     let tiny = 1e-12 * (dot(p, p) + dot(e, e));
@@ -71,7 +73,7 @@ fn meets(p: [f64; 2], e: [f64; 2], dp: [f64; 2], de: [f64; 2], pad_m: f64) -> bo
     roots(a, b, c).into_iter().flatten().any(|t| (0.0..=1.0).contains(&t) && on_segment(t))
 }
 
-/// The real roots of a t² + b t + c, by the formula that does not cancel.
+/// Returns the real roots of a t² + b t + c, by the formula without cancellation.
 fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     let discriminant = b * b - 4.0 * a * c;
     if discriminant < 0.0 {
@@ -117,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_segment_that_sweeps_over_a_vertex_is_seen() {
-        // The end of the segment sweeps over the vertex: before and after, they are far apart.
+        // The end of the segment sweeps over the vertex; before and after they are far apart.
         assert!(!apart([[0.0, 1.0], [0.0, 0.0], [2.0, 3.0]], [[0.0, 1.0], [0.0, 0.0], [-2.0, 3.0]]));
     }
 

@@ -1,4 +1,4 @@
-//! Which vertices are near which segments.
+//! A spatial index that finds the vertices near a segment.
 
 use crate::map::Map;
 use rstar::{AABB, RTree, primitives::GeomWithData};
@@ -10,7 +10,7 @@ pub(crate) struct VertexTree<'a> {
 }
 
 impl<'a> VertexTree<'a> {
-    /// All vertices.
+    /// Creates the tree of all vertices.
     pub fn of_all(map: &Map<'a>) -> Self {
         Self::new(*map, 0..map.vertices.len() as u32)
     }
@@ -20,7 +20,8 @@ impl<'a> VertexTree<'a> {
         VertexTree { tree: RTree::bulk_load(vertices.map(leaf).collect()), map }
     }
 
-    /// The vertices within `reach` (CRS units along x and y) of the bounding box of a segment, without its ends.
+    /// Returns the vertices within `reach` (CRS units along x and y) of the bounding box of a segment,
+    /// without its ends.
     pub fn around(&self, [a, b]: [u32; 2], reach: [f64; 2]) -> impl Iterator<Item = u32> {
         let (p, q) = (self.map.at(a), self.map.at(b));
         let lower = [0, 1].map(|axis| p[axis].min(q[axis]) - reach[axis]);
@@ -30,8 +31,8 @@ impl<'a> VertexTree<'a> {
     }
 }
 
-/// Where a segment that starts at the origin is nearest to a point: the squared distance, and the share of the way
-/// from its start to its end (0 to 1) at which the nearest place is.
+/// Returns the squared distance from a point to a segment that starts at the origin, and where the nearest
+/// place is, as a share (0 to 1) of the way from its start to its end.
 pub(crate) fn nearest(point: [f64; 2], end: [f64; 2]) -> (f64, f64) {
     let length2 = dot(end, end);
     let share = if length2 > 0.0 { (dot(point, end) / length2).clamp(0.0, 1.0) } else { 0.0 };
@@ -47,7 +48,7 @@ pub(crate) fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// The vector from `a` to `b`, CRS units, in metres.
+/// Returns the vector from `a` to `b`, CRS units, in metres.
 pub(crate) fn metres(a: [f64; 2], b: [f64; 2], scale: [f64; 2]) -> [f64; 2] {
     [(b[0] - a[0]) * scale[0], (b[1] - a[1]) * scale[1]]
 }

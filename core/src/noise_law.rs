@@ -1,17 +1,17 @@
-//! What shape the noise has, and what to make of it. Least squares is the best use of a displacement under
-//! Gaussian noise only. Rounding to a grid and "add up to ±50 cm" leave noise of short tails: there, large
-//! residuals tell much about the mark and small ones little.
+//! The shape of the noise and the transformation of residuals that suits it. Least squares is optimal under
+//! Gaussian noise only. Rounding to a grid and an attack that adds up to ±50 cm leave noise with short tails,
+//! under which large residuals carry more information about the mark than small ones.
 //!
 //! For noise of density f, the best test of a weak signal uses −f′/f of the residual in place of the residual
-//! (the locally optimum detector: Kassam, *Signal Detection in Non-Gaussian Noise*, 1988, chapter 2). Here f is a
-//! generalised Gaussian, exp(−|r|^κ), so −f′/f is sign(r) |r|^(κ−1); κ = 2 leaves everything as it is. κ is chosen from
-//! the residuals, without key or chips.
+//! (the locally optimum detector: Kassam, *Signal Detection in Non-Gaussian Noise*, 1988, chapter 2). Here f
+//! is a generalised Gaussian, exp(−|r|^κ), so −f′/f is sign(r) |r|^(κ−1); κ = 2 leaves residuals unchanged. κ
+//! is chosen from the residuals, without key or chips.
 
 /// The exponents κ that are tried.
 const EXPONENTS: [f64; 6] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0];
 /// κ > 2 must bring the variance below this share of that of least squares.
 const WORTH_IT: f64 = 0.9;
-/// Fewer residuals do not show a shape.
+/// Fewer residuals do not determine a shape.
 const LEAST_RESIDUALS: usize = 500;
 
 /// −f′/f of the noise, scaled so that a small shift of the residual shifts it as much.
@@ -21,12 +21,13 @@ pub struct NoiseLaw {
     pub exponent: f64,
     /// E[(κ−1) |r|^(κ−2)].
     slope: f64,
-    /// Variance of a residual made like this, square metres.
+    /// Variance of a transformed residual, square metres.
     pub variance_m2: f64,
 }
 
 impl NoiseLaw {
-    /// The law under which `residuals_m` (any number, metres, of one axis each) tell most about a shift.
+    /// Fits the law under which `residuals_m` (any number, metres, each of one axis) carry most information
+    /// about a shift.
     pub fn fit(residuals_m: &[f64]) -> Self {
         let plain = Self::with_exponent(2.0, residuals_m);
         if residuals_m.len() < LEAST_RESIDUALS {
@@ -45,7 +46,7 @@ impl NoiseLaw {
         NoiseLaw { exponent, slope, variance_m2 }
     }
 
-    /// What to use in place of a residual, metres.
+    /// Transforms a residual, metres.
     pub fn apply(&self, residual_m: f64) -> f64 {
         if self.exponent == 2.0 {
             return residual_m;

@@ -1,5 +1,5 @@
-//! Patches: the map cut into pieces of nearly `patch_size` vertices, each with its connected graph
-//! (paper, section 3.2; the split and the bridges are ours, see docs/method.md).
+//! Patches: the pieces of nearly `patch_size` vertices into which the map is cut, each with its connected
+//! graph (paper, section 3.2; the split and the bridges are ours, see docs/method.md).
 
 use crate::{
     Error, Result,
@@ -20,7 +20,7 @@ pub struct Patch {
     pub vertices: Vec<u32>,
     /// Edges as pairs of positions in `vertices`, `[i, j]` with i < j, sorted; they join all vertices.
     pub edges: Vec<[u32; 2]>,
-    /// How strongly each edge joins its ends, with [`Laplacian::Cotangent`]; empty with [`Laplacian::Biggs`].
+    /// The weight of each edge with [`Laplacian::Cotangent`]; empty with [`Laplacian::Biggs`].
     pub weights: Vec<f64>,
     /// The T-junctions among the vertices, ascending.
     pub hanging: Vec<HangingRow>,
@@ -33,7 +33,7 @@ pub struct Patch {
 pub struct BodyRows {
     /// Positions of its vertices.
     pub rows: Vec<u32>,
-    /// Where each of them is from the mean of all, metres.
+    /// The vector from the mean of all vertices to each of them, metres.
     pub arms_m: Vec<[f64; 2]>,
 }
 
@@ -42,12 +42,12 @@ pub struct BodyRows {
 pub struct HangingRow {
     /// Its position in the patch.
     pub row: u32,
-    /// Positions and weights of what it hangs on; none when part of that is in another patch.
+    /// Positions and weights of its anchors; empty when one of them is in another patch.
     pub anchors: Vec<(u32, f64)>,
 }
 
 impl Patch {
-    /// Lets the rows of hanging vertices follow (n × any): from what vertices would do to what they do.
+    /// Replaces the rows of hanging vertices (n × any) by those that follow from their anchors.
     pub(crate) fn follow(&self, rows: &mut Mat<f64>) {
         for column in 0..rows.ncols() {
             for hanging in &self.hanging {
@@ -58,7 +58,8 @@ impl Patch {
         }
     }
 
-    /// Whether a vertex hangs on vertices of other patches, so that this one does not tell how it moves.
+    /// Returns whether a vertex hangs on vertices of other patches, so that this patch does not determine its
+    /// movement.
     pub(crate) fn hangs_elsewhere(&self, row: usize) -> bool {
         let found = self.hanging.binary_search_by_key(&(row as u32), |hanging| hanging.row);
         found.is_ok_and(|i| self.hanging[i].anchors.is_empty())
@@ -82,7 +83,7 @@ impl Patches {
         Self::with_tree(map, &VertexTree::of_all(map), parameters)
     }
 
-    /// The same with a tree of all vertices.
+    /// Does the same as [`Self::new`] with a tree of all vertices.
     pub(crate) fn with_tree(map: &Map, tree: &VertexTree, parameters: &Parameters) -> Result<Self> {
         let (Map { vertices: table, ground, .. }, patch_size) = (map, parameters.patch_size);
         if table.is_empty() {
@@ -108,34 +109,35 @@ impl Patches {
         Ok(Patches { patches, positions_m, constraints })
     }
 
-    /// The patches; the position of a patch is its number.
+    /// Returns the patches; the position of a patch is its number.
     pub fn as_slice(&self) -> &[Patch] {
         &self.patches
     }
 
-    /// How many vertices the map has.
+    /// Returns the number of vertices of the map.
     pub fn vertex_count(&self) -> usize {
         self.positions_m.len()
     }
 
-    /// Where the vertices are, in canonical order, metres from the map's middle: for distances.
+    /// Returns the positions of the vertices in canonical order, metres from the middle of the map, for
+    /// distances.
     pub fn positions_m(&self) -> &[[f64; 2]] {
         &self.positions_m
     }
 
-    /// What keeps vertices from moving freely.
+    /// Returns the constraints on the movement of vertices.
     pub fn constraints(&self) -> &Constraints {
         &self.constraints
     }
 
-    /// The first `count` patches alone; the vertices of the others are in none.
+    /// Returns the first `count` patches alone; the vertices of the others are in none.
     pub(crate) fn head(&self, count: usize) -> Self {
         let patches = self.patches[..count.min(self.patches.len())].to_vec();
         Patches { patches, positions_m: self.positions_m.clone(), constraints: Constraints::default() }
     }
 
-    /// How many coefficients of a patch and axis carry a message of `bits` bits: one for every channel bit and
-    /// chip. They fit into the smallest patch besides the mean.
+    /// Returns how many coefficients of a patch and axis carry a message of `bits` bits: one for every
+    /// channel bit and chip. They fit into the smallest patch besides the mean.
     ///
     /// # Errors
     /// [`Error::TooManyCoefficients`] or [`Error::CodeLength`].
@@ -170,8 +172,9 @@ impl Patches {
     }
 }
 
-/// k-d split into `parts` leaves of nearly equal vertex counts, each set cut across the longer side
-/// of its bounding box, in proportion to the leaves on either side. A body goes where its first vertex goes.
+/// Splits the vertices by a k-d tree into `parts` leaves of nearly equal size. Each set is cut across the
+/// longer side of its bounding box, in proportion to the leaves on either side. A body goes to the side of
+/// its first vertex.
 fn split(points: &[[f64; 2]], constraints: &Constraints, parts: usize) -> Vec<Vec<u32>> {
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     let mut leaves = Vec::with_capacity(parts);
@@ -203,7 +206,7 @@ fn split_set(
         points[p as usize][axis].total_cmp(&points[q as usize][axis]).then(p.cmp(&q)).then(a.cmp(b))
     };
     set.select_nth_unstable_by(left, order);
-    // A body is one run in this order: cut before or after the one at the cut, whichever is nearer.
+    // A body is a run in this order: the cut moves before or after the body it meets, whichever is nearer.
     let cut = first(set[left]);
     let below = set[..left].iter().filter(|&&v| first(v) == cut).count();
     let above = set[left..].iter().filter(|&&v| first(v) == cut).count();
@@ -227,7 +230,7 @@ fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
     usize::from(extent(1) > extent(0))
 }
 
-/// Where a vertex is: its patch and its position in it.
+/// The patch of a vertex and its position in it.
 #[derive(Clone, Copy)]
 struct Place {
     patch: u32,
@@ -282,11 +285,12 @@ fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[Place])
     }
 }
 
-/// A triangle flatter than this (height over base, about) counts as so flat: cotangents stay finite.
+/// A triangle counts as no flatter than this (approximately height over base), so that cotangents stay
+/// finite.
 const LEAST_HEIGHT: f64 = 0.01;
 
-/// Weighs the edges of every patch by the cotangents of the angles that face them in the triangles of the mesh with
-/// all three corners in the patch, cot α + cot β; edges of no such triangle, bridges among them, by 1.
+/// Weighs the edges of every patch by cot α + cot β, over the angles that face them in the triangles of the
+/// mesh with all three corners in the patch. Edges of no such triangle, bridges among them, weigh 1.
 fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points: &[[f64; 2]]) {
     let mut of_patch: Vec<Vec<[u32; 3]>> = vec![Vec::new(); patches.len()];
     for triangle in triangles {
@@ -310,8 +314,8 @@ fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points
     });
 }
 
-/// The cotangent of a triangle's angle at a corner. Of a flat triangle all three are made smaller alike, so that
-/// its energy stays positive.
+/// Returns the cotangent of a triangle's angle at a corner. The three cotangents of a flat triangle shrink
+/// alike, so that its energy stays positive.
 fn cotangent(at: [[f64; 2]; 3], corner: usize) -> f64 {
     let side = |from: usize, to: usize| [at[to][0] - at[from][0], at[to][1] - at[from][1]];
     let (u, v) = (side(corner, (corner + 1) % 3), side(corner, (corner + 2) % 3));
@@ -319,7 +323,7 @@ fn cotangent(at: [[f64; 2]; 3], corner: usize) -> f64 {
     dot(u, v) / cross(u, v).abs().max(LEAST_HEIGHT * longest2)
 }
 
-/// The component of every vertex of a patch, by its first vertex, and how many components there are.
+/// Returns the component of every vertex of a patch, by its first vertex, and how many components there are.
 fn components(patch: &Patch) -> (Vec<u32>, usize) {
     let mut pieces = DisjointSets::new(patch.vertices.len());
     patch.edges.iter().for_each(|&[a, b]| pieces.join(a, b));
@@ -328,9 +332,9 @@ fn components(patch: &Patch) -> (Vec<u32>, usize) {
     (label, count)
 }
 
-/// Cutting the edges between patches can leave a patch in pieces, and a graph in pieces has a
-/// repeated eigenvalue 0. Starting from the piece of its first vertex, join the piece whose shortest
-/// edge to what is already joined is the shortest (ties: smaller positions), until one is left.
+/// Joins the pieces of a patch: cutting the edges between patches can disconnect a patch, and a disconnected
+/// graph has a repeated eigenvalue 0. Starting from the piece of the first vertex, the piece with the
+/// shortest edge to the joined ones is added (ties: smaller positions) until one piece is left.
 fn bridge(patch: &mut Patch, points: &[[f64; 2]]) {
     let (label, count) = components(patch);
     if count == 1 {

@@ -1,8 +1,9 @@
-//! Where a vertex ends that shall move: within the tolerance, on the output grid, off the edges of the world.
+//! The final place of a vertex: within the tolerance, on the output grid, and away from the edges of the
+//! world.
 
 use crate::{Error, Result, map::Map, options::Parameters, scale::Measure};
 
-/// What holds a displacement back.
+/// The limits of a displacement.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placement<'a> {
     measure: Measure<'a>,
@@ -19,7 +20,7 @@ impl<'a> Placement<'a> {
         Ok(Placement { measure: map.measure(), tolerance_m, precision })
     }
 
-    /// Where a vertex at `from` ends that should move by `wanted`, CRS units.
+    /// Returns the place of a vertex at `from` that should move by `wanted`, CRS units.
     pub fn place(&self, from: [f64; 2], wanted: [f64; 2]) -> [f64; 2] {
         if self.is_pinned(from) {
             return from;
@@ -42,23 +43,23 @@ impl<'a> Placement<'a> {
         }
     }
 
-    /// Whether a vertex at `from` may end there.
+    /// Returns whether a vertex at `from` may move to `to`.
     pub fn allows(&self, from: [f64; 2], to: [f64; 2]) -> bool {
         !self.is_pinned(from) && distance_m(from, to, self.measure.metres_per_unit(from)) <= self.tolerance_m
     }
 
-    /// Whether a vertex must stay where it is.
+    /// Returns whether a vertex must stay in place.
     pub fn is_pinned(&self, from: [f64; 2]) -> bool {
         self.measure.ground.is_pinned(from, self.tolerance_m)
     }
 
-    /// No vertex near `at` moves further, metres of a `scale` in metres per unit.
+    /// Returns the furthest that a vertex near `at` may move, metres of a `scale` in metres per unit.
     pub fn tolerance_in(&self, at: [f64; 2], scale: [f64; 2]) -> f64 {
         let there = self.measure.metres_per_unit(at);
         self.tolerance_m * (scale[0] / there[0]).min(scale[1] / there[1])
     }
 
-    /// The side of a cell of the output grid, CRS units; 0 without a grid.
+    /// Returns the side of a cell of the output grid, CRS units; 0 without a grid.
     pub fn grid(&self) -> f64 {
         self.precision.unwrap_or(0.0)
     }
@@ -68,8 +69,8 @@ fn distance_m(a: [f64; 2], b: [f64; 2], scale: [f64; 2]) -> f64 {
     ((b[0] - a[0]) * scale[0]).hypot((b[1] - a[1]) * scale[1])
 }
 
-/// The grid node nearest to `target` among those within the tolerance of `from`. `target` is within
-/// the tolerance too, and the tolerance is at least a cell, so there is one less than √2 cells away.
+/// Returns the grid node nearest to `target` among those within the tolerance of `from`. As `target` is
+/// within the tolerance, which is at least a cell, such a node exists less than √2 cells away.
 fn nearest_node(
     target: [f64; 2],
     from: [f64; 2],

@@ -1,4 +1,4 @@
-//! The record of a marking: what an auditor needs besides the key and the reference.
+//! The record of a marking, which an auditor needs besides the key and the reference.
 
 use crate::{
     Error, Result,
@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 /// The version this program writes and reads.
 pub const VERSION: u32 = 1;
 
-/// A record. Field names are the option names in lower case, with their unit; it never holds the
-/// secret and no time, so that equal input makes an equal record.
+/// A record. Its fields are the option names in lower case, with their unit. It holds neither the secret nor
+/// the time, so that equal input makes an equal record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -27,7 +27,7 @@ pub struct Record {
     pub recipient: Option<String>,
     /// The message, hexadecimal.
     pub message: String,
-    /// Whether the key whitened it before it was coded; left out where it did not, as of recipients.
+    /// Whether the key whitened the message before it was coded; omitted when it did not, as for recipients.
     #[serde(default, skip_serializing_if = "is_false")]
     pub whitened: bool,
     /// α.
@@ -38,9 +38,9 @@ pub struct Record {
     pub chip_rate: usize,
     /// d.
     pub patch_size: usize,
-    /// No vertex moved further.
+    /// No vertex moved further than this.
     pub tolerance_m: f64,
-    /// What moved as one.
+    /// Which vertices moved as one.
     pub shape: Rigidity,
     /// Which functions carry the mark.
     pub basis: Laplacian,
@@ -52,23 +52,23 @@ pub struct Record {
     pub srs: Option<String>,
     /// The reference map.
     pub reference: Reference,
-    /// How far its vertices moved.
+    /// The displacement of its vertices.
     pub displacement: Displacement,
-    /// How much the angles at its corners changed.
+    /// The change of the angles at its corners.
     pub angles: AngleChange,
-    /// How much the areas of its polygons changed.
+    /// The change of the areas of its polygons.
     pub areas: Areas,
-    /// How far its features are from where they were.
+    /// The Hausdorff distances between its features before and after.
     pub hausdorff: Hausdorff,
-    /// How many of them are invalid.
+    /// The numbers of invalid features.
     pub validity: Validity,
-    /// How many of its polygons overlap.
+    /// The numbers of overlapping polygons.
     pub overlaps: Overlaps,
-    /// What keeping the topology took.
+    /// The effort of keeping the topology.
     pub topology: TopologyEntry,
 }
 
-/// What marking did to a map.
+/// The distortion of a map by marking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs)] // the names are those of the record
 pub struct Distortion {
@@ -81,13 +81,13 @@ pub struct Distortion {
     pub topology: TopologyEntry,
 }
 
-/// What a record says about the reference map.
+/// The reference map, as a record describes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reference {
     /// Distinct vertices of the marked layers.
     pub vertices: usize,
-    /// Patches they were cut into.
+    /// Patches of the map.
     pub patches: usize,
     /// Digest of the vertices, see [`crate::vertices::VertexTable::digest`].
     pub vertices_sha256: String,
@@ -95,13 +95,13 @@ pub struct Reference {
     pub crs: Option<String>,
 }
 
-/// What a record says about the topology of the map.
+/// The topology of the map, as a record describes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TopologyEntry {
     /// Vertices that lie on segments of other features and moved with them.
     pub t_junctions: usize,
-    /// Vertices that moved otherwise than the mark wanted, so that nothing crosses that did not.
+    /// Vertices that moved differently from the mark, so that no new crossing appears.
     pub attenuated_vertices: usize,
 }
 
@@ -112,11 +112,10 @@ fn is_false(value: &bool) -> bool {
 impl Record {
     /// Reads a record's text and checks that its values are legal.
     ///
-    /// # Errors
-    /// [`Error::Record`] says what is wrong with it.
+    /// # Errors [`Error::Record`] describes the fault.
     pub fn from_json(text: &str) -> Result<Self> {
         let record: Record = serde_json::from_str(text).map_err(|error| {
-            // serde goes on with the list of all fields there are.
+            // serde appends the list of all fields.
             Error::Record(error.to_string().split(", expected one of").next().unwrap_or_default().into())
         })?;
         if record.meshmark_record != VERSION {
@@ -130,7 +129,7 @@ impl Record {
         Ok(record)
     }
 
-    /// What it says of the map's distortion.
+    /// Returns the distortion of the map.
     pub fn distortion(&self) -> Distortion {
         Distortion {
             displacement: self.displacement,
@@ -143,12 +142,12 @@ impl Record {
         }
     }
 
-    /// The text of the record.
+    /// Returns the text of the record.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("a record is JSON") + "\n"
     }
 
-    /// The parameters that shaped the mark.
+    /// Returns the parameters that shaped the mark.
     ///
     /// # Errors
     /// [`Error::Record`] when one of them is out of range.
@@ -168,7 +167,7 @@ impl Record {
         Ok(options.parameters)
     }
 
-    /// The message that was embedded.
+    /// Returns the message that was embedded.
     ///
     /// # Errors
     /// [`Error::Record`] when it is not hexadecimal.
@@ -176,10 +175,9 @@ impl Record {
         Message::from_hex(&self.message).map_err(|e| Error::Record(e.to_string()))
     }
 
-    /// What the mark says.
+    /// Returns the subject of the mark.
     ///
-    /// # Errors
-    /// As [`Record::message`], and when it has a recipient and a whitened message.
+    /// # Errors Those of [`Record::message`], and [`Error::Record`] for a recipient with a whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
             Some(_) if self.whitened => Err(Error::Record(

@@ -1,4 +1,4 @@
-//! How the vertices of a patch respond to its coefficients, constraints included.
+//! The response of the vertices of a patch to its coefficients, constraints included.
 
 use crate::{options::Rigidity, patches::Patch, spectrum::Basis};
 use faer::{
@@ -6,7 +6,7 @@ use faer::{
     linalg::matmul::triangular::{self, BlockStructure},
 };
 
-/// What unit coefficients move, per axis n × k.
+/// The displacements by unit coefficients, n × k per axis.
 pub(crate) enum Response {
     /// Both axes respond alike, each to its own coefficients.
     Separate(Mat<f64>),
@@ -16,14 +16,14 @@ pub(crate) enum Response {
 
 /// The products of all columns with all columns.
 pub(crate) struct Kernel {
-    /// Of columns of one axis with each other, for the axes named: lower triangles, k × k.
+    /// Products of columns of one axis, for the named axes: lower triangles, k × k.
     pub own: Vec<(Vec<usize>, Mat<f64>)>,
-    /// Of columns of the first axis (rows) with those of the second (columns), where they are not 0.
+    /// Products of columns of the first axis (rows) with those of the second (columns), where they are not 0.
     pub cross: Option<Mat<f64>>,
 }
 
 impl Kernel {
-    /// The sum of the diagonal.
+    /// Returns the sum of the diagonal.
     pub fn trace(&self) -> f64 {
         let of = |(axes, lower): &(Vec<usize>, Mat<f64>)| {
             axes.len() as f64 * (0..lower.ncols()).map(|i| lower[(i, i)]).sum::<f64>()
@@ -33,8 +33,8 @@ impl Kernel {
 }
 
 impl Response {
-    /// The response to the coefficients that carry the mark, all but the mean. With SHAPE=rigid it is amplified:
-    /// then the mark is expected to move vertices as far, root mean square, as it moves free ones.
+    /// Returns the response to the coefficients that carry the mark, all but the mean. With SHAPE=rigid it is
+    /// amplified, so that the expected displacement, root mean square, is that of free vertices.
     pub fn carriers(patch: &Patch, basis: &Basis, shape: Rigidity) -> Self {
         let carriers = basis.vectors.ncols() - 1;
         let basis = basis.vectors.subcols(1, carriers);
@@ -46,7 +46,8 @@ impl Response {
         response
     }
 
-    /// The root of what the basis functions move, squared, with T-junctions alone, over what they move with bodies.
+    /// Returns the ratio of the root mean square displacements by the basis functions with T-junctions alone
+    /// and with bodies.
     pub fn gain(&self, patch: &Patch, mut basis: Mat<f64>) -> f64 {
         let Response::Coupled(blocks) = self else { return 1.0 };
         patch.follow(&mut basis);
@@ -54,8 +55,8 @@ impl Response {
         if energy > 0.0 { (2.0 * basis.squared_norm_l2() / energy).sqrt() } else { 1.0 }
     }
 
-    /// The response to basis functions (columns, n × k): free vertices follow them, bodies as well as they can,
-    /// hanging vertices what they hang on.
+    /// Returns the response to basis functions (columns, n × k): free vertices follow them, bodies follow by
+    /// the nearest rigid motion, and hanging vertices follow their anchors.
     pub fn new(patch: &Patch, basis: Mat<f64>) -> Self {
         let mut response = match patch.bodies.is_empty() {
             true => Response::Separate(basis),
@@ -72,8 +73,8 @@ impl Response {
         }
     }
 
-    /// The covariance over vertices of the displacement along one axis, for random coefficients of ±1; where the axes
-    /// differ, their mean.
+    /// Returns the covariance over vertices of the displacement along one axis for random coefficients of ±1,
+    /// or the mean of both axes where they differ.
     pub fn covariance(&self) -> Mat<f64> {
         let of = |block: &Mat<f64>| block * block.transpose();
         match self {
@@ -82,7 +83,7 @@ impl Response {
         }
     }
 
-    /// The same of every block transformed.
+    /// Transforms every block by `f`.
     pub fn map(self, f: impl Fn(Mat<f64>) -> Mat<f64>) -> Self {
         match self {
             Response::Separate(block) => Response::Separate(f(block)),
@@ -90,7 +91,7 @@ impl Response {
         }
     }
 
-    /// Products of all columns with all columns.
+    /// Returns the products of all columns with all columns.
     pub fn kernel(&self) -> Kernel {
         match self {
             Response::Separate(block) => Kernel { own: vec![(vec![0, 1], lower_gram(block))], cross: None },
@@ -104,7 +105,7 @@ impl Response {
         }
     }
 
-    /// Products of the columns of either axis with displacements (n × 2).
+    /// Returns the products of the columns of either axis with displacements (n × 2).
     pub fn correlations(&self, moved: &Mat<f64>) -> [Vec<f64>; 2] {
         let (x, y) = (moved.col(0), moved.col(1));
         let products = match self {
@@ -116,7 +117,7 @@ impl Response {
         products.map(|product| product.iter().copied().collect())
     }
 
-    /// The rows of some vertices.
+    /// Returns the rows of some vertices.
     pub fn rows(&self, rows: &[usize]) -> Self {
         let of = |block: &Mat<f64>| Mat::from_fn(rows.len(), block.ncols(), |o, i| block[(rows[o], i)]);
         match self {
@@ -128,7 +129,7 @@ impl Response {
     }
 }
 
-/// The lower triangle of XᵀX, zeros above it.
+/// Returns the lower triangle of XᵀX, zeros above it.
 fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
     let mut gram = Mat::zeros(x.ncols(), x.ncols());
     triangular::matmul(
@@ -145,8 +146,8 @@ fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
     gram
 }
 
-/// Bodies take the mean of their vertices as a shift, and turn by θ = Σ (r_x u_y − r_y u_x) / Σ |r|²: the rigid
-/// motion nearest to the displacements u.
+/// Returns the coupled response: bodies shift by the mean of their vertices and turn by θ = Σ (r_x u_y − r_y
+/// u_x) / Σ |r|²: the rigid motion nearest to the displacements u.
 fn coupled(patch: &Patch, basis: Mat<f64>) -> [[Mat<f64>; 2]; 2] {
     let (n, columns) = (basis.nrows(), basis.ncols());
     let mut blocks = [[basis.clone(), Mat::zeros(n, columns)], [Mat::zeros(n, columns), basis]];

@@ -1,11 +1,11 @@
-//! The scale where a vertex is: metres on the ground per CRS unit, which differ over the map of a projected CRS.
+//! The scale at each vertex: metres on the ground per CRS unit, which vary over the map of a projected CRS.
 //!
-//! The mark itself has one scale for the whole map, [`Ground::Plane`]: that is version 1, and marks verify for ever. What
-//! a user is promised in metres, TOLERANCE and the figures of records and comparisons, is measured here.
+//! The mark itself has one scale for the whole map, [`Ground::Plane`]; version 1 of the mark fixes it.
+//! TOLERANCE and the figures of records and comparisons are measured by the scale of this module.
 
 use crate::{ground::Ground, vertices::VertexTable};
 
-/// Marks with one scale are legal where it is wrong by no more than this share at any vertex.
+/// A mark with one scale is legal where its error is at most this share at every vertex.
 const MOST_OFF: f64 = 0.05;
 
 /// The size of CRS units at a place.
@@ -18,7 +18,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// From what a unit along x and a unit along y are on the ground: vectors in metres, in any three perpendicular axes.
+    /// Creates the scale from the vectors on the ground of a unit along x and of a unit along y, metres, in
+    /// any three perpendicular axes.
     pub fn new(along_x: [f64; 3], along_y: [f64; 3]) -> Self {
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (xx, xy, yy) = (dot(along_x, along_x), dot(along_x, along_y), dot(along_y, along_y));
@@ -28,7 +29,7 @@ impl Scale {
         Scale { metres_per_unit: [xx.sqrt(), yy.sqrt()], extremes }
     }
 
-    /// A weighted mean of scales; the weights add up to 1.
+    /// Returns a weighted mean of scales; the weights add up to 1.
     fn mean(weighted: &[(f64, Scale)]) -> Self {
         let mean = |value: fn(&Scale) -> [f64; 2]| {
             [0, 1].map(|i| weighted.iter().map(|(weight, scale)| weight * value(scale)[i]).sum())
@@ -36,7 +37,7 @@ impl Scale {
         Scale { metres_per_unit: mean(|s| s.metres_per_unit), extremes: mean(|s| s.extremes) }
     }
 
-    /// How far a scale of so many metres per unit is from it in the worst direction, as a share.
+    /// Returns the error of a scale of so many metres per unit in the worst direction, as a share.
     fn off(&self, metres_per_unit: f64) -> f64 {
         self.extremes.map(|m| (metres_per_unit / m - 1.0).abs()).into_iter().fold(0.0, f64::max)
     }
@@ -54,8 +55,8 @@ pub struct ScaleLattice {
 }
 
 impl ScaleLattice {
-    /// `scales_at` measures the scales at many places. A map in which one scale of `metres_per_unit` is wrong by less than
-    /// `negligible` (a share) everywhere needs no lattice.
+    /// Measures a lattice; `scales_at` returns the scales at many places. A map in which the error of the one
+    /// scale `metres_per_unit` is less than `negligible` (a share) everywhere needs none.
     pub fn measure(
         vertices: &VertexTable,
         metres_per_unit: f64,
@@ -82,7 +83,8 @@ impl ScaleLattice {
         ScaleLattice { lower, cell, nodes_per_side, nodes: scales_at(&places) }
     }
 
-    /// The scale at a point, of the corners of its cell that have one; `None` where none of them has.
+    /// Interpolates the scale at a point from the corners of its cell that have one; `None` where none of
+    /// them has.
     pub fn at(&self, point: [f64; 2]) -> Option<Scale> {
         let last = self.nodes_per_side - 2;
         let place = |axis: usize| {
@@ -104,28 +106,28 @@ impl ScaleLattice {
     }
 }
 
-/// Nodes per side of the lattice that tells whether a finer one is needed.
+/// Nodes per side of the lattice that decides whether a finer one is needed.
 const COARSE: usize = 5;
 /// Nodes per side. Over a whole EPSG:3857 map up to 89.99° the interpolated scale is within 0.3 %.
 const FINE: usize = 65;
 
-/// Metres on the ground where a point is.
+/// The measure of metres on the ground at a point.
 #[derive(Debug, Clone, Copy)]
 pub struct Measure<'a> {
-    /// Where one scale, or that of the ellipsoid, is right everywhere.
+    /// The scale of the mark, or that of the ellipsoid, for maps where it is exact.
     pub ground: Ground,
-    /// Where it is not.
+    /// The lattice, for maps where it is not.
     pub lattice: Option<&'a ScaleLattice>,
 }
 
 impl Measure<'_> {
-    /// Metres per CRS unit along x and y at a point.
+    /// Returns metres per CRS unit along x and y at a point.
     pub fn metres_per_unit(&self, point: [f64; 2]) -> [f64; 2] {
         let scale = self.lattice.and_then(|lattice| lattice.at(point));
         scale.map_or_else(|| self.ground.metres_per_unit(point), |scale| scale.metres_per_unit)
     }
 
-    /// The vector from `a` to `b` (CRS units) in metres, measured at `a`.
+    /// Returns the vector from `a` to `b` (CRS units) in metres, measured at `a`.
     pub fn metres_between(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let [mx, my] = self.metres_per_unit(a);
         [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
@@ -151,7 +153,7 @@ mod tests {
 
     const RADIUS_M: f64 = 6_378_137.0;
 
-    /// That of the Mercator projection of a sphere.
+    /// Returns the scale of the Mercator projection of a sphere.
     fn mercator([_, y]: [f64; 2]) -> Scale {
         let metres = 1.0 / (y / RADIUS_M).cosh();
         Scale::new([metres, 0.0, 0.0], [0.0, metres, 0.0])

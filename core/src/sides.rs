@@ -1,19 +1,20 @@
-//! A vertex that touches a segment keeps to its side of it, to the last bit.
+//! Vertices that touch a segment stay on their side of it, to the last bit.
 //!
-//! It follows the place where it touches, and rounding puts it on either side. Where its own segments all lead away on
-//! one side, the other one is through the wall: then it goes back by units in the last place.
+//! Such a vertex follows the place where it touches, and rounding puts it on either side. Where all its own
+//! segments lead away on one side, the other side is through the wall: the vertex is nudged back by a few
+//! ulps.
 
 use crate::{map::Map, orientation::orientation, placement::Placement};
 
-/// Contacts depend on each other through shared vertices; more rounds than a chain of them needs.
+/// Contacts depend on each other through shared vertices; this many rounds exceed the longest chain.
 const MOST_ROUNDS: usize = 16;
-/// A vertex goes back by so many units in the last place at most.
+/// A vertex is nudged by at most this many ulps.
 const MOST_STEPS: usize = 64;
 
-/// A vertex and a segment it touches, which is no end of it.
+/// A vertex and a segment that it touches without being its end.
 pub(crate) type Touching = (u32, [u32; 2]);
 
-/// Which side a vertex must be on.
+/// The side of a segment on which a vertex must be.
 struct Contact {
     vertex: u32,
     segment: [u32; 2],
@@ -29,7 +30,7 @@ impl Contact {
     }
 }
 
-/// Puts vertices back on the side they were on; `coords` are their new places. A grid leaves no room for it.
+/// Puts vertices back on their side; `coords` are their new places. On a grid there is no room for it.
 pub(crate) fn keep(map: &Map, touching: &[Touching], placement: &Placement, coords: &mut [[f64; 2]]) {
     if placement.grid() > 0.0 || touching.is_empty() {
         return;
@@ -90,7 +91,7 @@ fn contacts(map: &Map, touching: &[Touching]) -> Vec<Contact> {
     touching.iter().filter_map(contact).collect()
 }
 
-/// The orientation of a vertex to a segment.
+/// Returns the orientation of a vertex to a segment.
 fn side(coords: &[[f64; 2]], vertex: u32, segment: [u32; 2]) -> f64 {
     let [a, b, p] = [segment[0], segment[1], vertex].map(|v| coords[v as usize]);
     orientation(a, b, p)

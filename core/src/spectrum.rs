@@ -12,8 +12,8 @@ use rand_chacha::{
 };
 use std::borrow::Cow;
 
-/// Eigenvalues closer than this are one subspace: its basis is chosen by [`canonical_rotation`], not
-/// by the solver.
+/// Eigenvalues closer than this share one subspace, whose basis [`canonical_rotation`] chooses, not the
+/// solver.
 const EQUAL_EIGENVALUES: f64 = 1e-8;
 
 /// The first eigenvectors of the Laplacian of a patch.
@@ -27,7 +27,8 @@ const EQUAL_EIGENVALUES: f64 = 1e-8;
 pub struct Basis {
     /// n × k, column i = e_i, |e_i| = 1; column 0 is the constant one (eigenvalue 0).
     pub vectors: Mat<f64>,
-    /// k eigenvalues, ascending, those of Biggs in [0, 2], cotangent ones as shares of the largest diagonal entry.
+    /// k eigenvalues, ascending; those of Biggs are in [0, 2], cotangent ones are shares of the largest
+    /// diagonal entry.
     pub eigenvalues: Vec<f64>,
     /// n vertex degrees, the diagonal of D; 1 each with the cotangent Laplacian.
     pub degrees: Vec<f64>,
@@ -44,9 +45,9 @@ impl Basis {
         Self::with_solver(patch, count, solve)
     }
 
-    /// The same with another symmetric eigen-solver: L (n × n) and `count` to the `count` lowest eigenvalues,
-    /// ascending, and their eigenvectors as columns, with all that are equal to the last of them; further ones
-    /// do no harm. Tests prove with it that the basis does not depend on the solver.
+    /// Solves with another symmetric eigen-solver, which takes L (n × n) and `count` and returns the `count`
+    /// lowest eigenvalues, ascending, and their eigenvectors as columns, with all that are equal to the last
+    /// of them; further ones are ignored. With it tests prove that the basis does not depend on the solver.
     #[doc(hidden)]
     pub fn with_solver(
         patch: &Patch,
@@ -65,7 +66,7 @@ impl Basis {
         Ok(Basis { vectors, eigenvalues: values[..count].to_vec(), degrees, norms_squared })
     }
 
-    /// That of patch `number`, if it is among the `known` ones of the first patches, else solved for.
+    /// Returns the basis of patch `number` from the `known` ones of the first patches, or solves for it.
     pub(crate) fn known_or_solved<'a>(
         known: &'a [Basis],
         number: usize,
@@ -78,7 +79,7 @@ impl Basis {
         }
     }
 
-    /// Analysis with the dual basis: the k coefficients of `values` (n of them, one axis).
+    /// Analyses n `values` of one axis with the dual basis; returns k coefficients.
     pub fn analyse(&self, values: &[f64]) -> Vec<f64> {
         let n = values.len();
         let weighted = Mat::from_fn(n, 1, |v, _| values[v] * self.degrees[v]);
@@ -86,14 +87,14 @@ impl Basis {
         self.norms_squared.iter().enumerate().map(|(i, norm2)| norm2 * product[(i, 0)]).collect()
     }
 
-    /// Synthesis: E times the k `coefficients`, n values of one axis.
+    /// Synthesises n values of one axis, E times the k `coefficients`.
     pub fn synthesise(&self, coefficients: &[f64]) -> Vec<f64> {
         let product = &self.vectors * Mat::from_fn(coefficients.len(), 1, |i, _| coefficients[i]);
         (0..product.nrows()).map(|v| product[(v, 0)]).collect()
     }
 }
 
-/// L = I − D^−½ A D^−½ (n × n) and the degrees D.
+/// Returns L = I − D^−½ A D^−½ (n × n) and the degrees D.
 fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
     let n = patch.vertices.len();
     let mut degrees = vec![0.0; n];
@@ -111,9 +112,9 @@ fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
     (laplacian, degrees)
 }
 
-/// The Dirichlet Laplacian of a patch (n × n), −(cot α + cot β) off the diagonal and rows that sum to 0 (U. Pinkall,
-/// K. Polthier, *Computing discrete minimal surfaces and their conjugates*, Exp. Math. 2, 1993), divided by its
-/// largest diagonal entry: which eigenvalues are equal must not depend on the unit of the map.
+/// Returns the Dirichlet Laplacian of a patch (n × n), −(cot α + cot β) off the diagonal and rows that sum to 0
+/// (U. Pinkall, K. Polthier, *Computing discrete minimal surfaces and their conjugates*, Exp. Math. 2, 1993),
+/// divided by its largest diagonal entry: which eigenvalues are equal must not depend on the unit of the map.
 fn cotangent_laplacian(patch: &Patch) -> Mat<f64> {
     let n = patch.vertices.len();
     let mut laplacian = Mat::zeros(n, n);
@@ -128,9 +129,9 @@ fn cotangent_laplacian(patch: &Patch) -> Mat<f64> {
     laplacian / faer::Scale(largest)
 }
 
-/// The lowest eigenvalues and eigenvectors of a symmetric matrix, as [`Basis::with_solver`] needs them:
-/// tridiagonalise, solve that, transform back only the columns there are. One thread, so that the result
-/// does not depend on how many there are.
+/// Solves for the lowest eigenvalues and eigenvectors of a symmetric matrix, as [`Basis::with_solver`] needs
+/// them: it tridiagonalises, solves the tridiagonal problem, and transforms only the resulting columns back.
+/// It uses one thread, so that the result does not depend on the number of threads.
 fn solve(mut matrix: Mat<f64>, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = matrix.nrows();
     let block = qr::no_pivoting::factor::recommended_block_size::<f64>(n, n);
@@ -158,12 +159,12 @@ fn solve(mut matrix: Mat<f64>, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     Some((values, vectors))
 }
 
-/// Where the group of equal eigenvalues that holds value `count − 1` ends.
+/// Returns the end of the group of equal eigenvalues that holds value `count − 1`.
 fn end_of_group(values: &[f64], count: usize) -> usize {
     (count..values.len()).find(|&i| values[i] - values[i - 1] >= EQUAL_EIGENVALUES).unwrap_or(values.len())
 }
 
-/// Replaces the solver's choice of basis in every group of equal eigenvalues by ours.
+/// Replaces the solver's basis of every group of equal eigenvalues by the canonical one.
 fn canonicalise(values: &[f64], vectors: &mut Mat<f64>) {
     let mut probes = Probes::new(vectors.nrows());
     let mut start = 0;
@@ -183,9 +184,9 @@ fn canonicalise(values: &[f64], vectors: &mut Mat<f64>) {
     }
 }
 
-/// The rotation Q (g × g) that takes the eigenvectors U (n × g) of one eigenvalue to a basis that
-/// depends on their subspace alone: with probes F (n × g), UᵀF = QR, diag R > 0. Any other
-/// orthonormal basis UO gives OᵀQ and so the same UQ. For g = 1 it is the sign of uᵀf.
+/// Returns the rotation Q (g × g) that takes the eigenvectors U (n × g) of one eigenvalue to a basis that
+/// depends on their subspace alone: with probes F (n × g), UᵀF = QR, diag R > 0. Any other orthonormal basis
+/// UO gives OᵀQ and so the same UQ. For g = 1 it is the sign of uᵀf.
 fn canonical_rotation(group: MatRef<'_, f64>, probes: MatRef<'_, f64>) -> Mat<f64> {
     let size = group.ncols();
     let seen = group.transpose() * probes;
@@ -199,8 +200,8 @@ fn canonical_rotation(group: MatRef<'_, f64>, probes: MatRef<'_, f64>) -> Mat<f6
     rotation
 }
 
-/// Fixed pseudo-random test functions on the vertices of a patch. ChaCha20 with a published seed:
-/// anyone can make them again, and no symmetric map is orthogonal to them by its symmetry.
+/// Fixed pseudo-random test functions on the vertices of a patch. They come from ChaCha20 with a published
+/// seed: anyone can reproduce them, and no symmetric map is orthogonal to them by its symmetry.
 ///
 /// Column i is made when a group first needs it; entry (v, i) is uniform in [−1, 1).
 struct Probes {
@@ -212,7 +213,7 @@ impl Probes {
         Probes { columns: Mat::zeros(rows, 0) }
     }
 
-    /// n × count.
+    /// Returns the first `count` columns, n × count.
     fn columns(&mut self, count: usize) -> MatRef<'_, f64> {
         for i in self.columns.ncols()..count {
             let mut stream = ChaCha20Rng::from_seed(*b"meshmark: canonical eigenvectors");

@@ -1,7 +1,8 @@
 //! Moving vertices without changing the topology of the map: no vertex passes through a segment.
 //!
-//! Where the mark would push one through, the vertices involved become a cluster that moves more and more as one,
-//! then less and less. A map that does not move at all is always legal, so this ends.
+//! Where the mark would push a vertex through, the vertices involved form a cluster. It is attenuated step by
+//! step: first the differences among its displacements, then their mean. A map that does not move is always
+//! legal, so the procedure ends.
 
 use crate::{
     bodies::{Body, Motion},
@@ -17,10 +18,10 @@ use crate::{
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How a cluster moves at each level of attenuation: the share of its mean displacement, and the share of what its
-/// members' displacements differ by. Level 0 is a vertex that no other restrains.
+/// The movement of a cluster at each level of attenuation: the share of its mean displacement, and the share
+/// of the deviations of its members from that mean. Level 0 is a vertex that no other restrains.
 const LEVELS: [(f64, f64); 6] = [(1.0, 1.0), (1.0, 0.5), (1.0, 0.25), (1.0, 0.0), (0.5, 0.0), (0.0, 0.0)];
-/// The last level: all members stay where they are.
+/// The last level: all members stay in place.
 const FROZEN: usize = LEVELS.len() - 1;
 /// The level at which clusters that meet start again: they move as one.
 const RIGID: usize = 3;
@@ -29,15 +30,15 @@ const RIGID: usize = 3;
 pub(crate) struct Settled {
     /// The new place of every vertex, CRS units.
     pub coords: Vec<[f64; 2]>,
-    /// How many vertices moved otherwise than they should have.
+    /// How many vertices moved differently from what was wanted.
     pub attenuated: usize,
-    /// By how much, metres along an axis: root mean square over all vertices.
+    /// The deviation from what was wanted, metres along an axis: root mean square over all vertices.
     pub deviation_m: f64,
 }
 
-/// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest to it, as far as
-/// the topology of the map and the placement allow; `tree` holds all vertices. On a grid too coarse for the map,
-/// rounding alone may change topology; that is left.
+/// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest to it, as
+/// far as the topology of the map and the placement allow; `tree` holds all vertices. On a grid too coarse
+/// for the map, rounding alone may change the topology; such changes are not undone.
 pub(crate) fn settle(
     map: &Map,
     tree: &VertexTree,
@@ -70,10 +71,10 @@ pub(crate) fn settle(
     Settled { coords, attenuated, deviation_m }
 }
 
-/// A vertex and a segment that come together.
+/// A vertex and a segment that meet.
 type Hit = [u32; 3];
 
-/// Where everything goes. What moves by itself is a free vertex, or a body, which goes by its first vertex.
+/// The state of the movement. Its movers are free vertices, and bodies, each named by its first vertex.
 struct Movement<'a> {
     map: Map<'a>,
     constraints: &'a Constraints,
@@ -81,12 +82,12 @@ struct Movement<'a> {
     slack: Slack,
     /// CRS units.
     wanted: &'a [[f64; 2]],
-    /// CRS units; those of hanging vertices and of members of bodies follow.
+    /// CRS units; displacements of hanging vertices and of members of bodies follow from them.
     displacements: Vec<[f64; 2]>,
     coords: Vec<[f64; 2]>,
 }
 
-/// Vertices that have moved since the last look.
+/// Vertices that have moved since the last search for hits.
 struct Changed<'a> {
     is_changed: Vec<bool>,
     tree: VertexTree<'a>,
@@ -120,7 +121,7 @@ impl<'a> Movement<'a> {
         self.constraints.bodies.number_at(vertex).map(|body| &self.constraints.bodies.as_slice()[body])
     }
 
-    /// How a free vertex or a body should move.
+    /// Returns the wanted motion of a free vertex or a body.
     fn wanted_of(&self, mover: u32) -> Motion {
         let wanted_m =
             |scale: [f64; 2], v: u32| [0, 1].map(|axis| self.wanted[v as usize][axis] * scale[axis]);
@@ -155,7 +156,7 @@ impl<'a> Movement<'a> {
         self.map.ground.metres_per_unit(self.map.at(vertex))
     }
 
-    /// Lets the members of a cluster move as its level says.
+    /// Moves the members of a cluster by its level of attenuation.
     fn attenuate(&mut self, cluster: &Cluster) {
         let (of_mean, of_rest) = LEVELS[cluster.level];
         let wanted: Vec<Motion> = cluster.members.iter().map(|&mover| self.wanted_of(mover)).collect();
@@ -167,14 +168,14 @@ impl<'a> Movement<'a> {
         }
     }
 
-    /// Lets hanging vertices follow and places all.
+    /// Moves hanging vertices along with their anchors and places all vertices.
     fn place(&mut self) {
         self.constraints.junctions.follow(&mut self.displacements);
         let place = |(from, displacement): (&[f64; 2], &[f64; 2])| self.placement.place(*from, *displacement);
         self.coords = self.map.vertices.coords().par_iter().zip(&self.displacements).map(place).collect();
     }
 
-    /// The same, and what that changes.
+    /// Places all vertices and returns what changed.
     fn advance(&mut self) -> Changed<'a> {
         let before = std::mem::take(&mut self.coords);
         self.place();
@@ -183,7 +184,8 @@ impl<'a> Movement<'a> {
         Changed { tree: VertexTree::new(self.map, changed), is_changed }
     }
 
-    /// All vertices that meet a segment on their way, or, after a change, those that the change concerns.
+    /// Returns all vertices that meet a segment on their way, or, after a change, those that the change
+    /// affects.
     fn hits(&self, tree: &VertexTree, changed: Option<&Changed>) -> Vec<Hit> {
         let moved =
             |v: usize| [0, 1].map(|axis| (self.coords[v][axis] - self.map.vertices.coords()[v][axis]).abs());
@@ -196,7 +198,7 @@ impl<'a> Movement<'a> {
                 _ => tree,
             };
             let ends = larger(moved(a as usize), moved(b as usize));
-            // A little more for the least gap, whatever a unit is.
+            // The margin covers the least gap in any unit.
             let reach = [0, 1].map(|axis| 1.001 * (ends[axis] + furthest[axis]));
             let found = near.around([a, b], reach).map(move |v| [v, a, b]);
             found.filter(|&triple| !self.keeps_apart(triple)).collect::<Vec<Hit>>()
@@ -210,7 +212,7 @@ impl<'a> Movement<'a> {
         keeps_apart(&before, &after, self.map.ground.metres_per_unit(before[0]), self.slack)
     }
 
-    /// The free vertices and bodies whose displacements make a hit.
+    /// Returns the free vertices and bodies whose displacements make a hit.
     fn movers(&self, hit: &Hit) -> Vec<u32> {
         let mover = |vertex: u32| self.body(vertex).map_or(vertex, |body| body.members[0]);
         let of = |vertex: &u32| match self.constraints.junctions.hanging_at(*vertex) {
@@ -243,8 +245,8 @@ impl Clusters {
         Clusters { sets: DisjointSets::new(vertices), clusters: BTreeMap::new() }
     }
 
-    /// Joins the vertices of every hit and raises the level of the clusters they come to be in: their roots.
-    /// What is frozen as a whole cannot be helped further and is not among them.
+    /// Joins the vertices of every hit, raises the level of their clusters and returns the roots of these.
+    /// Clusters that are frozen cannot be attenuated further and are not among them.
     fn merge(&mut self, hits: impl Iterator<Item = Vec<u32>>) -> BTreeSet<u32> {
         let (mut joined, mut again) = (BTreeSet::new(), Vec::new());
         for movers in hits {

@@ -1,15 +1,14 @@
 //! The lowest eigenvalues and eigenvectors of a symmetric tridiagonal matrix.
 //!
-//! Divide and conquer computes all n vectors at O(n³) together. When the eigenvalues asked for lie apart,
-//! as those of a real map do, a vector can be had alone at O(n): Sturm counts enclose its eigenvalue
-//! (J. H. Wilkinson, *The Algebraic Eigenvalue Problem*, 1965, chapter 5), and a twisted factorisation gives
-//! the vector and a better eigenvalue (B. N. Parlett, I. S. Dhillon, *Fernando's solution to Wilkinson's
-//! problem*, Linear Algebra and its Applications 267, 1997). Both treat a batch of eigenvalues at a time.
+//! Divide and conquer computes all n vectors at O(n³) together. When the wanted eigenvalues lie apart, as
+//! those of a real map do, a single vector costs O(n): Sturm counts enclose its eigenvalue (J. H. Wilkinson,
+//! *The Algebraic Eigenvalue Problem*, 1965, chapter 5), and a twisted factorisation gives the vector and a
+//! better eigenvalue (B. N. Parlett, I. S. Dhillon, *Fernando's solution to Wilkinson's problem*, Linear
+//! Algebra and its Applications 267, 1997). Both treat a batch of eigenvalues at a time.
 //!
-//! What comes out is proved, not trusted: there is an eigenvalue within the residual of each value, the
-//! enclosures are disjoint, and the error of a vector is at most its residual over the distance to the next
-//! eigenvalue. A matrix that does not pass, one with repeated eigenvalues for example, is solved by divide
-//! and conquer.
+//! The result is verified: an eigenvalue lies within the residual of each value, the enclosures are disjoint,
+//! and the error of a vector is at most its residual over the distance to the next eigenvalue. Divide and
+//! conquer solves a matrix that fails, for example one with repeated eigenvalues.
 #![expect(clippy::needless_range_loop)] // one lane of several arrays at a time
 
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -22,23 +21,23 @@ use std::array::from_fn;
 const LANES: usize = 16;
 type Lanes = [f64; LANES];
 
-/// The first shifts divide the range of all eigenvalues into so many parts.
+/// The first shifts divide the range of all eigenvalues into this many parts.
 const PARTS: usize = 256;
 /// Bisection ends at this width. All sizes are relative to the norm of the matrix.
 const ENCLOSURE: f64 = 1e-7;
-/// Where a rounded value may lie outside its enclosure.
+/// A rounded value may lie outside its enclosure by this much.
 const ROUNDING: f64 = 1e-14;
-/// A residual so small needs no further iteration.
+/// A residual this small needs no further iteration.
 const SMALL_RESIDUAL: f64 = 1e-15;
-/// A vector with a residual so large is refused.
+/// A vector with a residual this large is refused.
 const LARGE_RESIDUAL: f64 = 1e-13;
-/// How often a vector is iterated; three times is usual.
+/// A vector is iterated at most this often; three times is usual.
 const ITERATIONS: usize = 6;
 /// Vectors of eigenvalues closer than this are made orthogonal, as LAPACK's dstein does.
 const CLOSE: f64 = 1e-3;
-/// A pivot is never smaller.
+/// A pivot is never smaller than this.
 const LEAST_PIVOT: f64 = 1e-20;
-/// With an entry below the diagonal smaller than this the matrix is two.
+/// An entry below the diagonal that is smaller than this splits the matrix in two.
 const LEAST_BELOW: f64 = 1e-18;
 /// Rows after which the Sturm sequence is scaled. It shrinks by 1e-36 in a row at most.
 const SCALED_ROWS: usize = 8;
@@ -51,17 +50,17 @@ pub(crate) struct Tridiagonal {
 }
 
 impl Tridiagonal {
-    /// From the n entries of the diagonal and the n − 1 below it.
+    /// Creates the matrix from the n entries of the diagonal and the n − 1 below it.
     pub fn new(diagonal: Vec<f64>, mut below: Vec<f64>) -> Self {
         assert_eq!(diagonal.len(), below.len() + 1);
         below.push(0.0);
         Tridiagonal { diagonal, below }
     }
 
-    /// At least the `count` lowest eigenvalues, ascending, and their eigenvectors, columns of n. It is `count`
-    /// of them when all are more than `least_gap` from any other eigenvalue, else all n.
+    /// Returns at least the `count` lowest eigenvalues, ascending, and their eigenvectors, columns of n:
+    /// `count` of them when all are more than `least_gap` from any other eigenvalue, else all n.
     ///
-    /// `None` when divide and conquer does not converge.
+    /// It is `None` when divide and conquer does not converge.
     pub fn lowest(&self, count: usize, least_gap: f64) -> Option<(Vec<f64>, Mat<f64>)> {
         Arch::new().dispatch(Apart { matrix: self, count, least_gap }).or_else(|| self.divide_and_conquer())
     }
@@ -88,7 +87,7 @@ impl Tridiagonal {
         Some((values.iter().copied().collect(), vectors))
     }
 
-    /// The range of all eigenvalues (Gershgorin).
+    /// Returns the range of all eigenvalues (Gershgorin).
     fn range(&self) -> [f64; 2] {
         let mut above = 0.0;
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
@@ -101,8 +100,8 @@ impl Tridiagonal {
     }
 }
 
-/// [`Tridiagonal::lowest`] when the eigenvalues lie apart. Everything it calls is inlined, so that it is
-/// compiled for every instruction set; the results are the same on all, as there are no fused operations.
+/// [`Tridiagonal::lowest`] for eigenvalues that lie apart. Everything it calls is inlined, so that it is
+/// compiled for every instruction set; the results are the same on all, as no operations are fused.
 struct Apart<'a> {
     matrix: &'a Tridiagonal,
     count: usize,
@@ -148,14 +147,14 @@ impl WithSimd for Apart<'_> {
     }
 }
 
-/// `f` of every item, and of the last one in the lanes that are left.
+/// Applies `f` to every item, and to the last one in the remaining lanes.
 #[inline(always)]
 fn lanes<T>(items: &[T], f: impl Fn(&T) -> f64) -> Lanes {
     from_fn(|lane| f(&items[lane.min(items.len() - 1)]))
 }
 
 impl Tridiagonal {
-    /// Intervals of at most `width` around the `count` lowest eigenvalues.
+    /// Returns intervals of at most `width` around the `count` lowest eigenvalues.
     #[inline(always)]
     fn enclose(&self, count: usize, [low, high]: [f64; 2], width: f64) -> Vec<[f64; 2]> {
         let mut enclosures = vec![[low, high]; count];
@@ -181,8 +180,8 @@ impl Tridiagonal {
         enclosures
     }
 
-    /// How many eigenvalues are below each shift λ: the changes of sign in the sequence of the leading
-    /// principal minors of T − λ.
+    /// Counts the eigenvalues below each shift λ, which are the changes of sign in the sequence of the
+    /// leading principal minors of T − λ.
     #[inline(always)]
     fn sturm_counts(&self, shifts: &Lanes) -> [u64; LANES] {
         let mut counts = [0; LANES];
@@ -209,7 +208,7 @@ impl Tridiagonal {
     }
 }
 
-/// Eigenvalues on their way, and what a twisted factorisation of T − λ leaves for each.
+/// A batch of eigenvalues under iteration, with the twisted factorisation of T − λ of each.
 struct Batch {
     /// λ.
     shifts: Lanes,
@@ -278,7 +277,7 @@ impl Batch {
         (twists, gammas)
     }
 
-    /// The vectors z with (T − λ) z = γ_k e_k and z_k = 1, k the `twists`; returns |z|².
+    /// Solves (T − λ) z = γ_k e_k with z_k = 1, where k are the `twists`; returns |z|².
     #[inline(always)]
     fn solve(&mut self, twists: &Lanes) -> Lanes {
         let n = self.vectors.len();
@@ -316,7 +315,7 @@ fn away_from_zero(pivot: f64) -> f64 {
     if pivot.abs() < LEAST_PIVOT { LEAST_PIVOT } else { pivot }
 }
 
-/// Gram and Schmidt's process among the vectors of eigenvalues closer than `close`.
+/// Orthogonalises the vectors of eigenvalues closer than `close` by the process of Gram and Schmidt.
 #[inline(always)]
 fn orthogonalise(values: &[f64], vectors: &mut Mat<f64>, close: f64) {
     for i in 1..values.len() {
@@ -347,7 +346,7 @@ mod tests {
         })
     }
 
-    /// The largest entry of T V − V Λ and of VᵀV − 1.
+    /// Returns the largest entry of T V − V Λ and of VᵀV − 1.
     fn errors(matrix: &Tridiagonal, values: &[f64], vectors: &Mat<f64>) -> [f64; 2] {
         let image = dense(matrix) * vectors;
         let scaled = Mat::from_fn(vectors.nrows(), vectors.ncols(), |i, j| vectors[(i, j)] * values[j]);
@@ -402,7 +401,7 @@ mod tests {
             Tridiagonal::new((0..41).map(|i| -f64::abs(i as f64 - 20.0)).collect(), vec![1.0; 40]);
         // Two strings that do not touch.
         let strings = Tridiagonal::new(vec![2.0; 80], (1..80).map(|i| f64::from(i % 40 != 0)).collect());
-        // The second and the third are equal; only the second is asked for.
+        // The second and the third are equal; only the second is wanted.
         let at_the_end = Tridiagonal::new(vec![1.0, 2.0, 2.0, 3.0], vec![1e-9, 0.0, 1e-9]);
         for (matrix, count) in [(wilkinson, 10), (strings, 5), (at_the_end, 2)] {
             let (values, _) = lowest(&matrix, count);

@@ -11,7 +11,7 @@ pub struct VertexTable {
     coords: Vec<[f64; 2]>,
 }
 
-/// A map is not wider, CRS units.
+/// A map is at most this wide, CRS units.
 pub const WIDEST: f64 = 1e30;
 
 impl VertexTable {
@@ -23,7 +23,7 @@ impl VertexTable {
         Ok(Self::indexed(coords)?.0)
     }
 
-    /// The same, and for every one of `coords` the canonical index of its vertex.
+    /// Does the same as [`Self::new`], and returns the canonical index of the vertex of each of `coords`.
     ///
     /// # Errors
     /// Those of [`Self::new`].
@@ -52,27 +52,27 @@ impl VertexTable {
         Ok((table, indices))
     }
 
-    /// The vertices in canonical order, CRS units.
+    /// Returns the vertices in canonical order, CRS units.
     pub fn coords(&self) -> &[[f64; 2]] {
         &self.coords
     }
 
-    /// How many distinct vertices there are.
+    /// Returns how many distinct vertices there are.
     pub fn len(&self) -> usize {
         self.coords.len()
     }
 
-    /// Whether the map has no vertex at all.
+    /// Returns whether the map has no vertex at all.
     pub fn is_empty(&self) -> bool {
         self.coords.is_empty()
     }
 
-    /// The canonical index of the vertex with exactly these coordinates.
+    /// Returns the canonical index of the vertex with exactly these coordinates.
     pub fn index_of(&self, point: [f64; 2]) -> Option<usize> {
         self.coords.binary_search_by(|p| order(p, &canonical(point))).ok()
     }
 
-    /// The corners of the bounding box, lower left and upper right; zeros when empty.
+    /// Returns the corners of the bounding box, lower left and upper right; zeros when empty.
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         let Some(&first) = self.coords.first() else { return ([0.0; 2], [0.0; 2]) };
         self.coords.iter().fold((first, first), |(min, max), p| {
@@ -80,21 +80,21 @@ impl VertexTable {
         })
     }
 
-    /// The middle of the bounding box, CRS units.
+    /// Returns the middle of the bounding box, CRS units.
     pub fn centre(&self) -> [f64; 2] {
         let (min, max) = self.bounds();
         [min[0] + (max[0] - min[0]) / 2.0, min[1] + (max[1] - min[1]) / 2.0]
     }
 
-    /// Coordinates relative to the middle of the map, x multiplied by `x_scale`: what the mesh and
-    /// the patches are built on. Without the shift, triangulating EPSG:3857 coordinates loses vertices.
+    /// Returns coordinates relative to the middle of the map, x multiplied by `x_scale`; mesh and patches are
+    /// built on them. Without the shift, triangulating EPSG:3857 coordinates loses vertices.
     pub fn local(&self, x_scale: f64) -> Vec<[f64; 2]> {
         let [x0, y0] = self.centre();
         self.coords.iter().map(|[x, y]| [(x - x0) * x_scale, y - y0]).collect()
     }
 
-    /// SHA-256 of the canonical vertices (x then y, 64-bit IEEE, little endian), in hexadecimal:
-    /// binds a record to its reference map.
+    /// Returns the SHA-256 of the canonical vertices (x then y, 64-bit IEEE, little endian) in hexadecimal,
+    /// which binds a record to its reference map.
     pub fn digest(&self) -> String {
         let mut hash = Sha256::new();
         for [x, y] in &self.coords {

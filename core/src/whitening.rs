@@ -1,29 +1,30 @@
 //! Whitening: messages that differ in one bit are carried as bits that differ in half of their places.
 //!
-//! A message that a producer chooses may be a serial number, and the numbers of two copies then differ in very few
-//! bits. A keyed pseudorandom permutation of all messages of one length makes the carried bits of every message those
-//! of a random one, which is what the null hypothesis of the verdict supposes. The permutation is a balanced
-//! Feistel network (M. Luby, C. Rackoff, *How to construct pseudorandom permutations from pseudorandom functions*, SIAM
-//! Journal on Computing 17, 1988) of ten rounds, as many as NIST SP 800-38G has, over HMAC-SHA-256.
+//! A message that a producer chooses may be a serial number, and the numbers of two copies then differ in
+//! very few bits. A keyed pseudorandom permutation of all messages of one length makes the carried bits of
+//! every message those of a random one, as the null hypothesis of the verdict assumes. The permutation is a
+//! balanced Feistel network (M. Luby, C. Rackoff, *How to construct pseudorandom permutations from
+//! pseudorandom functions*, SIAM Journal on Computing 17, 1988) of ten rounds, as many as NIST SP 800-38G
+//! has, over HMAC-SHA-256.
 
 use crate::{key::SecretKey, message::Message};
 
 const ROUNDS: u8 = 10;
 
-/// The bits that carry a message under a key; as many as it has.
+/// Returns the bits that carry a message under a key, as many as the message has.
 pub(crate) fn whiten(key: &SecretKey, message: &Message) -> Message {
     permute(key, message, 0..ROUNDS)
 }
 
 impl SecretKey {
-    /// The message that this key whitens to these bits.
+    /// Returns the message that this key whitens to these bits.
     pub fn unwhitened(&self, carried: &Message) -> Message {
         permute(self, carried, (0..ROUNDS).rev())
     }
 }
 
-/// Every round adds to one half what the key makes of the other one: even rounds to the first half, odd ones to the
-/// second, so that a round is its own inverse.
+/// Adds, in every round, a keyed function of one half to the other half: even rounds change the first half,
+/// odd rounds the second, so that a round is its own inverse.
 fn permute(key: &SecretKey, message: &Message, rounds: impl Iterator<Item = u8>) -> Message {
     let mut bits = message.bits().to_vec();
     let (first, second) = bits.split_at_mut(message.len() / 2);

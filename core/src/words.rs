@@ -1,6 +1,6 @@
-//! Words of messages.
+//! Counts and nouns in messages.
 
-/// A number and its noun, which is given in the singular: `1 record`, `2 records`, `3 vertices`.
+/// Returns a number and its noun, which is given in the singular: `1 record`, `2 records`, `3 vertices`.
 pub fn counted(count: usize, noun: &str) -> String {
     match count {
         1 => format!("1 {noun}"),

@@ -1,5 +1,5 @@
-//! Assumptions about maps whose CRS is missing or wrong: which CRS their numbers may be in, given where on earth
-//! they should be.
+//! Assumptions about maps whose CRS is missing or wrong: the CRS that their coordinates may be in, given the
+//! region of the earth where they should lie.
 
 use crate::{CoordinateSystem, Result, Survey, crs::reproject};
 use meshmark_core::vertices::VertexTable;
@@ -8,16 +8,16 @@ use meshmark_core::vertices::VertexTable;
 const PROJECTED_CRS: &str = include_str!("projected_crs.csv");
 /// Places are compared this much beyond a region, degrees: datums differ by up to a kilometre.
 const DATUM_DEGREES: f64 = 0.02;
-/// And by this share of the region's size, for what a suspect may have more than the reference.
+/// A region is also extended by this share of its size, as a suspect may reach beyond the reference.
 const MARGIN: f64 = 0.1;
-/// Areas of use are rounded, and maps go a little beyond them.
+/// Areas of use are rounded, and maps reach a little beyond them.
 const AREA_MARGIN_DEGREES: f64 = 0.5;
 /// A map of which less than this share lies in the region is somewhere else.
 const LEAST_SHARE: f64 = 0.1;
-/// So many points of a map tell where it is.
+/// This many points of a map determine its region.
 const SAMPLE: usize = 500;
 
-/// What a map's numbers are taken for.
+/// An interpretation of the coordinates of a map.
 #[derive(Debug, Clone)]
 pub struct Assumption {
     /// Their CRS.
@@ -27,10 +27,9 @@ pub struct Assumption {
 }
 
 impl Assumption {
-    /// The same map, with its raw numbers taken like this, in the CRS `target`.
+    /// Applies the assumption to a map of raw coordinates and reprojects it into the CRS `target`.
     ///
-    /// # Errors
-    /// Coordinates that cannot be brought there.
+    /// # Errors Fails for coordinates that cannot be reprojected.
     pub fn apply(&self, raw: &Survey, target: &CoordinateSystem) -> Result<Survey> {
         raw.brought(target, |mut coords| {
             if self.axes_swapped {
@@ -48,7 +47,7 @@ struct Region {
 }
 
 impl Region {
-    /// Where a map is.
+    /// Returns the region of a map.
     fn covering(crs: &CoordinateSystem, table: &VertexTable) -> Option<Region> {
         let places: Vec<[f64; 2]> = crs.degrees(&sample(table)).into_iter().flatten().collect();
         let first = *places.first()?;
@@ -62,7 +61,7 @@ impl Region {
         [0, 1].map(|axis| (self.min[axis] + self.max[axis]) / 2.0)
     }
 
-    /// The share of the places that is in the region or close to it.
+    /// Returns the share of the places in the region or close to it.
     fn share(&self, places: &[Option<[f64; 2]>]) -> f64 {
         let near = |place: &&Option<[f64; 2]>| {
             place.is_some_and(|p| {
@@ -80,15 +79,16 @@ fn sample(table: &VertexTable) -> Vec<[f64; 2]> {
     table.coords().iter().step_by(table.len().div_ceil(SAMPLE).max(1)).copied().collect()
 }
 
-/// Whether a good part of the map is about where the reference is; both in the CRS of the reference.
+/// Returns whether a good part of the map lies in the region of the reference; both are in the CRS of the
+/// reference.
 pub fn overlaps(map: &Survey, reference: &Survey) -> bool {
     let Some(crs) = &reference.crs else { return true };
     let Some(region) = Region::covering(crs, &reference.data.vertices) else { return true };
     region.share(&crs.degrees(&sample(&map.data.vertices))) >= LEAST_SHARE
 }
 
-/// What the raw numbers of a map may be, so that the map comes to lie about where the reference is, the most
-/// usual first. `own` is the CRS the map claims. Datums are not told apart here.
+/// Lists the assumptions under which a map of raw coordinates lies in the region of the reference, the most
+/// usual first. `own` is the CRS that the map claims. Datums are not distinguished here.
 pub fn likely_assumptions(
     raw: &Survey,
     own: Option<&CoordinateSystem>,
@@ -115,8 +115,8 @@ pub fn likely_assumptions(
     likely
 }
 
-/// EPSG codes of what is used at a place: degrees, web maps, UTM of its zone and its neighbours, on both sides
-/// of the equator, and the grids made for it.
+/// Lists the EPSG codes of the CRS in use at a place: degrees, web maps, UTM of its zone and the neighbouring
+/// ones, on both sides of the equator, and the grids that cover it.
 fn codes_at([longitude, latitude]: [f64; 2]) -> Vec<u32> {
     let mut codes = vec![4326, 3857];
     let zone = ((longitude + 180.0) / 6.0).floor() as i64;

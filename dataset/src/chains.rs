@@ -13,13 +13,13 @@ use std::collections::BTreeMap;
 #[derive(Clone, Default)]
 pub(crate) struct Chains {
     pub(crate) coords: Vec<[f64; 2]>,
-    /// Where in `coords` each of them starts, ascending.
+    /// The index in `coords` where each of them starts, ascending.
     pub(crate) starts: Vec<u32>,
-    /// What each of them is.
+    /// The kind of each of them.
     pub(crate) kinds: Vec<Step>,
-    /// Which of them is the first of each geometry, ascending.
+    /// The number of the first of them in each geometry, ascending.
     pub(crate) firsts: Vec<u32>,
-    /// The geometries that are more than their chains, by their numbers.
+    /// The geometries that their chains do not describe completely, by their numbers.
     pub(crate) others: BTreeMap<u32, Vec<u8>>,
 }
 

@@ -8,7 +8,7 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 
-/// What a CRS is called that has no name.
+/// Names of a CRS without a name.
 const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
 
 /// The CRS of a map.
@@ -16,36 +16,38 @@ const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
 pub struct CoordinateSystem(SpatialRef);
 
 impl CoordinateSystem {
-    /// Takes a CRS as x = easting or longitude, y = northing or latitude.
+    /// Wraps a CRS with the axes x = easting or longitude, y = northing or latitude.
     pub fn new(mut srs: SpatialRef) -> Self {
         srs.set_axis_mapping_strategy(AxisMappingStrategy::TraditionalGisOrder);
         CoordinateSystem(srs)
     }
 
-    /// The CRS of a layer; `None` where it says "undefined", as GeoPackages do that were written without one.
+    /// Creates the CRS of a layer; `None` where it is "undefined", as in GeoPackages that were written
+    /// without one.
     pub fn of_layer(srs: SpatialRef) -> Option<Self> {
         let is_undefined = srs.name().is_some_and(|name| name.starts_with("Undefined "));
         (!is_undefined).then(|| Self::new(srs))
     }
 
-    /// As GDAL has it.
+    /// Returns the CRS of GDAL.
     pub fn spatial_ref(&self) -> &SpatialRef {
         &self.0
     }
 
-    /// "EPSG:3067", or WKT when it has no code.
+    /// Returns the code, such as "EPSG:3067", or WKT without one.
     pub fn label(&self) -> String {
         self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
     }
 
-    /// What messages call it: "EPSG:3067", or its name when it has no code.
+    /// Returns the name for messages: the code, such as "EPSG:3067", or the name of a CRS without one.
     pub fn brief_name(&self) -> String {
         let name = || self.0.name().filter(|name| !NO_NAMES.iter().any(|no| no.eq_ignore_ascii_case(name)));
         let or_name = self.0.authority().ok().or_else(name);
         or_name.or_else(|| self.0.to_proj4().ok()).unwrap_or_else(|| "unknown CRS".into())
     }
 
-    /// What messages call two that are not the same: brief names, and what they mean where those are equal.
+    /// Returns the names of two different CRS for messages: brief names, with their definitions where those
+    /// are equal.
     pub fn names_apart(&self, other: &CoordinateSystem) -> [String; 2] {
         let names = [self, other].map(CoordinateSystem::brief_name);
         if names[0] != names[1] {
@@ -54,23 +56,24 @@ impl CoordinateSystem {
         [self, other].map(|crs| format!("{}, {}", names[0], crs.0.to_proj4().unwrap_or_default().trim()))
     }
 
-    /// Whether both mean the same x and y; the map has no use for heights.
+    /// Returns whether both have the same x and y; heights do not matter to a map.
     pub fn is_same(&self, other: &CoordinateSystem) -> bool {
         self.0 == other.0 || self.horizontal().is_some_and(|own| Some(own) == other.horizontal())
     }
 
-    /// The CRS of x and y alone, in this order.
+    /// Returns the CRS of x and y alone, in this order.
     fn horizontal(&self) -> Option<SpatialRef> {
         let horizontal = SpatialRef::from_wkt(&wkt::horizontal(&self.0.to_wkt().ok()?)?).ok()?;
         Some(Self::new(horizontal).0)
     }
 
-    /// The transformation of coordinates from this CRS into `target`.
+    /// Returns the transformation of coordinates from this CRS into `target`.
     pub(crate) fn transform_to(&self, target: &CoordinateSystem) -> gdal::errors::Result<CoordTransform> {
         CoordTransform::new(&self.0, &target.0)
     }
 
-    /// Places in degrees east of Greenwich and north, on this CRS's own datum; `None` where it has no such place.
+    /// Converts points to degrees east of Greenwich and north, on the datum of this CRS; `None` where it has
+    /// no such place.
     pub(crate) fn degrees(&self, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
         let (mut x, mut y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
         let Ok(geographic) = self.0.geog_cs().map(CoordinateSystem::new) else {
@@ -78,7 +81,7 @@ impl CoordinateSystem {
         };
         if !self.0.is_geographic() {
             let Ok(transform) = self.transform_to(&geographic) else { return vec![None; points.len()] };
-            // An error is of some points only; those are not finite then.
+            // An error concerns some points only, which are then not finite.
             let _ = transform.transform_coords(&mut x, &mut y, &mut []);
         }
         let prime_meridian = geographic.0.get_attr_value("PRIMEM", 1).ok().flatten();
@@ -91,7 +94,7 @@ impl CoordinateSystem {
         x.into_iter().zip(y).map(place).collect()
     }
 
-    /// The scales of a map in which the one of its ground is not right everywhere.
+    /// Measures the scales of a map for which the scale of its ground is not exact everywhere.
     pub(crate) fn lattice(&self, table: &VertexTable, ground: &Ground) -> Option<ScaleLattice> {
         let Ground::Plane { metres_per_unit } = *ground else { return None };
         let local = Local::new(self)?;
@@ -120,8 +123,8 @@ impl CoordinateSystem {
         })
     }
 
-    /// Metres per unit at a place: the square root of the areal scale, by differences of 100 units of
-    /// length in longitude and latitude. An EPSG:3857 unit is half a metre at Helsinki.
+    /// Measures metres per unit at a place, the square root of the areal scale, by differences of 100 units
+    /// of length in longitude and latitude. An EPSG:3857 unit is half a metre at Helsinki.
     fn measured_metres_per_unit(&self, place: [f64; 2]) -> Option<f64> {
         let local = Local::new(self)?;
         let [lon, lat] = local.around(&[place]);
@@ -131,7 +134,7 @@ impl CoordinateSystem {
         let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
         let measured = area.sqrt() / (2.0 * local.step);
         let measured = (measured.is_finite() && measured > 0.0).then_some(measured)?;
-        // Across the 180th meridian and about a pole, differences of longitudes are no lengths.
+        // Across the 180th meridian and near a pole, differences of longitudes are not lengths.
         let in_space = local.scales(&[place]).pop().flatten().map(|scale| {
             let [least, largest] = scale.extremes;
             (least * largest).sqrt()
@@ -144,10 +147,10 @@ impl CoordinateSystem {
     }
 }
 
-/// A scale that is wrong by a smaller share is right.
+/// An error of the scale below this share is negligible.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// The scales of a projected CRS, by differences of 100 metres.
+/// The scales of a projected CRS, measured by differences of 100 metres.
 struct Local {
     to_geographic: CoordTransform,
     ellipsoid: Ground,
@@ -166,14 +169,14 @@ impl Local {
         Some(Local { to_geographic, ellipsoid, step: 50.0 / crs.0.linear_units() })
     }
 
-    /// Longitudes and latitudes left and right of each place, below and above it, and of itself; not finite where the
-    /// projection has no such place.
+    /// Returns longitudes and latitudes of the points left, right, below and above each place, and of the
+    /// place itself; they are not finite where the projection has no such place.
     fn around(&self, places: &[[f64; 2]]) -> [Vec<f64>; 2] {
         let s = self.step;
         let around =
             places.iter().flat_map(|[x, y]| [[x - s, *y], [x + s, *y], [*x, y - s], [*x, y + s], [*x, *y]]);
         let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = around.map(|[x, y]| (x, y)).unzip();
-        // An error is of some points only; those are not finite then.
+        // An error concerns some points only, which are then not finite.
         let _ = self.to_geographic.transform_coords(&mut lon, &mut lat, &mut []);
         [lon, lat]
     }
@@ -194,10 +197,10 @@ impl Local {
     }
 }
 
-/// Points around a place, itself included.
+/// Number of points around a place, itself included.
 const POINTS: usize = 5;
 
-/// A CRS from a user's text: EPSG:…, WKT, PROJ.
+/// Parses a CRS given by the user: EPSG:…, WKT, PROJ.
 ///
 /// # Errors
 /// [`Error::UnknownSrs`].
@@ -206,8 +209,8 @@ pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
     Ok(CoordinateSystem::new(srs))
 }
 
-/// Metres on the ground for a map: its CRS decides; without one a unit is a metre, unless every
-/// coordinate could be a degree.
+/// Returns metres on the ground for a map, by its CRS; without one a unit is a metre, unless every coordinate
+/// could be a degree.
 pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Result<Ground> {
     if let Some(crs) = crs {
         return crs.ground(table);
@@ -220,7 +223,7 @@ pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Res
     Ok(Ground::Plane { metres_per_unit: 1.0 })
 }
 
-/// Brings coordinates into `target`; those of a layer without a CRS are taken to be in it.
+/// Reprojects coordinates into `target`; those of a layer without a CRS are assumed to be in it.
 pub(crate) fn reproject(
     coords: &mut [[f64; 2]],
     from: Option<&CoordinateSystem>,

@@ -1,8 +1,8 @@
-//! The horizontal part of a CRS, cut out of its text: the `gdal` crate has no function for it.
+//! The horizontal part of a CRS, taken from its WKT, as the `gdal` crate has no function for it.
 
 use gdal::spatial_ref::SpatialRef;
 
-/// The text of a CRS without heights, the easting or longitude first.
+/// Returns the WKT of a CRS without heights, with the easting or longitude first.
 pub(crate) fn horizontal(wkt: &str) -> Option<String> {
     let (keyword, mut parts) = split(wkt)?;
     if matches!(keyword, "COMPD_CS" | "COMPOUNDCRS") {
@@ -10,7 +10,7 @@ pub(crate) fn horizontal(wkt: &str) -> Option<String> {
     }
     let mut axes = (0..parts.len()).filter(|&i| parts[i].starts_with("AXIS["));
     match (axes.next(), axes.next(), axes.next()) {
-        // Only the newer text has a third axis, and that of the CRS without it is the older again.
+        // Only WKT 2 has a third axis; the CRS without it is written as WKT 1 again.
         (Some(_), Some(_), Some(height)) => {
             parts.remove(height);
             let flat = join(keyword, &parts).replace("CS[ellipsoidal,3]", "CS[ellipsoidal,2]");
@@ -27,7 +27,7 @@ pub(crate) fn horizontal(wkt: &str) -> Option<String> {
     }
 }
 
-/// The keyword of a node and what is between its brackets, part by part.
+/// Splits a node into its keyword and the parts between its brackets.
 fn split(wkt: &str) -> Option<(&str, Vec<&str>)> {
     let (keyword, rest) = wkt.split_once('[')?;
     let (mut depth, mut quoted) = (0, false);

@@ -1,8 +1,9 @@
-//! Coordinates as decimal numbers: what GDAL makes of a double when it writes GeoJSON.
+//! Coordinates as decimal numbers, which GDAL writes to GeoJSON.
 //!
-//! GDAL rounds to a number of decimals or of significant figures, and then takes a run of zeros or nines at certain
-//! places for noise and ends the number there. That is the same from GDAL 3.6 to 3.12, and a function of the double: so the
-//! values that a file may hold are computed here, and any other value is a difference.
+//! GDAL rounds to a number of decimals or of significant figures, and then treats a run of zeros or nines at
+//! certain places as noise and ends the number there. This rule is the same from GDAL 3.6 to 3.12 and a
+//! function of the double: this module computes the values that a file may hold, and any other value is a
+//! difference.
 
 use meshmark_core::{counted, vertices::VertexTable};
 use std::fmt;
@@ -10,11 +11,11 @@ use std::fmt;
 /// The digits with which coordinates are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Digits {
-    /// All: every bit is kept.
+    /// All digits: every bit is kept.
     Every,
-    /// So many after the point.
+    /// This many digits after the point.
     Decimals(usize),
-    /// So many from the first that is not zero on.
+    /// This many significant figures.
     Figures(usize),
 }
 
@@ -28,12 +29,13 @@ impl fmt::Display for Digits {
     }
 }
 
-/// GDAL looks for noise in numbers of so many figures at least, and leaves out so many figures at most.
+/// GDAL searches numbers of at least this many figures for noise, and drops at most
+/// [`MOST_FIGURES_LEFT_OUT`].
 const NOISY_FIGURES: usize = 11;
 const MOST_FIGURES_LEFT_OUT: usize = 3;
 
 impl Digits {
-    /// How to have more of them.
+    /// Returns the remedy for too few digits.
     pub fn more(self) -> Option<&'static str> {
         match self {
             Digits::Every => None,
@@ -42,7 +44,7 @@ impl Digits {
         }
     }
 
-    /// The values with which a file may hold `v`.
+    /// Returns the values that a file may hold for `v`.
     fn values(self, v: f64) -> Vec<f64> {
         let texts = match self {
             Digits::Every => return vec![v],
@@ -60,14 +62,14 @@ impl Digits {
         texts.iter().map(|text| text.parse().expect("a number that was just written")).collect()
     }
 
-    /// How far a value of a file may be from the one that was computed: the last bits go in the conversion to decimal
-    /// digits and back.
+    /// Returns how far a value in a file may be from the computed one: the conversion to decimal digits and
+    /// back loses the last bits.
     fn slack(self, v: f64) -> f64 {
         if self == Digits::Every { 0.0 } else { 4.0 * f64::EPSILON * v.abs() }
     }
 
-    /// Where a file has each of `wanted`, or none when `places` do not have them all; places with a number in
-    /// `is_explained` are as one of `wanted` may be written.
+    /// Finds each of `wanted` among the `places` of a file; `None` when one is missing. It sets
+    /// `is_explained` for each place that is a possible form of one of `wanted`.
     fn search(
         self,
         wanted: &[[f64; 2]],
@@ -92,13 +94,14 @@ impl Digits {
         wanted.iter().map(&mut find).collect()
     }
 
-    /// Where a file has each of `wanted`, or none when `places` do not have them all.
+    /// Finds each of `wanted` among the `places` of a file; `None` when one is missing.
     pub fn find_all(self, wanted: &[[f64; 2]], places: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
         let table = VertexTable::new(places).ok()?;
         self.search(wanted, table.coords(), &mut vec![false; table.coords().len()])
     }
 
-    /// Whether `places` are `wanted` as a file may hold them, in any order: each of either is one of the other.
+    /// Returns whether `places` are `wanted` in a form that a file may hold, in any order: each of either
+    /// corresponds to one of the other.
     pub fn are_kept(self, wanted: &[[f64; 2]], places: Vec<[f64; 2]>) -> bool {
         let Ok(table) = VertexTable::new(places) else { return wanted.is_empty() };
         let mut is_explained = vec![false; table.coords().len()];
@@ -106,8 +109,8 @@ impl Digits {
     }
 }
 
-/// The number as it is when GDAL takes its last digits for noise: with a run of five zeros or nines before the last digit, or
-/// one of up to seven, shorter in larger numbers, before the last eight or so.
+/// Returns the number that GDAL writes when it treats the last digits as noise: after a run of five zeros or
+/// nines before the last digit, or of up to seven, shorter in larger numbers, before about the last eight.
 fn without_noise(text: &str) -> Option<String> {
     let digits = text.as_bytes();
     let point = text.find('.')?;
@@ -140,7 +143,7 @@ fn without_noise(text: &str) -> Option<String> {
     }
 }
 
-/// A decimal number, one more in its last digit, away from zero.
+/// Returns a decimal number increased by one in its last digit, away from zero.
 fn next_decimal(text: &str) -> String {
     let mut digits = text.as_bytes().to_vec();
     for digit in digits.iter_mut().rev().filter(|digit| digit.is_ascii_digit()) {
@@ -168,7 +171,8 @@ mod tests {
     use proptest::{prelude::*, test_runner::Config};
     use std::path::Path;
 
-    /// Numbers as the longitudes and metres of maps are, many of them with runs of zeros and nines anywhere.
+    /// Generates numbers like the longitudes and metres of maps, many of them with runs of zeros and nines
+    /// anywhere.
     fn numbers() -> impl Strategy<Value = f64> {
         let run = || {
             proptest::sample::select(vec!["0", "9"])
@@ -185,7 +189,7 @@ mod tests {
         (size, any::<bool>()).prop_map(|(v, is_negative)| if is_negative { -v } else { v })
     }
 
-    /// What a format of GDAL makes of numbers, as both coordinates of points.
+    /// Writes numbers as both coordinates of points by a driver of GDAL and reads them back.
     fn written(driver: &str, options: &[(String, String)], numbers: &[f64]) -> Vec<[f64; 2]> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("points.json");
@@ -213,7 +217,7 @@ mod tests {
             .collect()
     }
 
-    /// A format with layer options.
+    /// Returns a format with layer options.
     fn formats() -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
         let number = |least, most| proptest::option::of((least..=most).prop_map(|n: i32| n.to_string()));
         let driver = proptest::sample::select(vec!["GeoJSON", "GeoJSONSeq"]);

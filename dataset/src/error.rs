@@ -2,7 +2,7 @@ use crate::read_back::Difference;
 use meshmark_core::options::Spelling;
 use std::{fmt, io, path::Path};
 
-/// What can be wrong with a dataset. Every message names the input and the remedy.
+/// The errors of datasets. Every message names the input and the remedy.
 #[derive(Debug)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
@@ -35,7 +35,7 @@ pub enum Error {
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What went wrong with a file.
+/// Creates the error of an action on a file.
 pub fn file_error(action: &'static str, path: &Path, error: io::Error) -> Error {
     Error::File { action, path: path.display().to_string(), reason: error.to_string() }
 }
@@ -61,7 +61,7 @@ impl From<meshmark_core::Error> for Error {
 }
 
 impl Error {
-    /// The message, in which options are named as the user of this front end writes them.
+    /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
         let srs = |crs: &str| spelling.value("SRS", crs);
         match self {

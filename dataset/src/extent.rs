@@ -1,12 +1,14 @@
-//! How far away a place can be: further numbers are an accident, and would leave nothing of the other vertices.
+//! The largest coordinates of a place: larger numbers are an accident, beside which all other vertices would
+//! collapse.
 
 use crate::{CoordinateSystem, Error, Result};
 use meshmark_core::vertices::WIDEST;
 
-/// Past a thousand times the width of any map of the Earth a number is coarser than a tenth of a millimetre.
+/// Beyond a thousand times the width of any map of the Earth a number is coarser than a tenth of a
+/// millimetre.
 const FURTHEST_M: f64 = 1e12;
 
-/// Longitudes may count on past the date line, but nobody turns so often.
+/// Longitudes may continue past the date line, but not for ten turns.
 const FURTHEST_DEGREES: f64 = 3600.0;
 
 /// The largest coordinate of a map, CRS units.
@@ -14,10 +16,10 @@ const FURTHEST_DEGREES: f64 = 3600.0;
 pub(crate) struct Extent(f64);
 
 impl Extent {
-    /// Whatever is not wider than a mesh can be.
+    /// The widest extent of a mesh.
     pub(crate) const ANY: Extent = Extent(WIDEST / 2.0);
 
-    /// Of maps in a CRS. A map without one is in metres.
+    /// Returns the extent of maps in a CRS. A map without one is in metres.
     pub(crate) fn in_crs(crs: Option<&CoordinateSystem>) -> Self {
         let Some(srs) = crs.map(CoordinateSystem::spatial_ref) else { return Extent(FURTHEST_M) };
         Extent(match srs.is_geographic() {
@@ -26,7 +28,7 @@ impl Extent {
         })
     }
 
-    /// Fails for a coordinate of a feature that is no place in it.
+    /// Fails for a coordinate of a feature outside the extent.
     ///
     /// # Errors
     /// [`Error::NotFinite`], [`Error::TooFar`].

@@ -12,16 +12,15 @@ pub struct FeatureGeometry {
     pub layer: String,
     /// The feature's id, when it has one.
     pub fid: Option<u64>,
-    /// Itself.
+    /// The geometry.
     pub outline: Outline,
 }
 
-/// The geometries of all features of the chosen layers (all when `None`), in the order of the dataset; features
-/// without one are left out. `last_failure` is as in [`crate::Selection`].
+/// Reads the geometries of all features of the chosen layers (all when `None`), in the order of the dataset,
+/// without features that have none. `last_failure` is as in [`crate::Selection`].
 ///
-/// # Errors
-/// A layer that does not exist or cannot be read to its end, a geometry that makes no sense, coordinates that are no
-/// place.
+/// # Errors Fails for a layer that does not exist or cannot be read to its end, a malformed geometry, and
+/// coordinates outside the extent of the CRS.
 pub fn features(
     dataset: &Dataset,
     layers: Option<&[String]>,

@@ -1,4 +1,4 @@
-//! Whether two paths lead to one file.
+//! The identity of files, by which two paths to one file are recognised.
 
 use std::{
     fs::{self, Metadata},
@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-/// What a file is, whatever its names.
+/// The identity of a file, whatever its names.
 #[derive(PartialEq, Clone, Copy)]
 pub struct FileId {
     device: u64,
@@ -14,18 +14,18 @@ pub struct FileId {
 }
 
 impl FileId {
-    /// The file at a path, if there is one.
+    /// Returns the identity of the file at a path, if there is one.
     pub fn at(path: &Path) -> Option<Self> {
         fs::metadata(path).ok().map(|metadata| FileId::of_metadata(&metadata))
     }
 
-    /// The file these metadata are of.
+    /// Returns the identity of the file with these metadata.
     pub fn of_metadata(metadata: &Metadata) -> Self {
         FileId { device: metadata.dev(), inode: metadata.ino() }
     }
 }
 
-/// Whether both paths lead to one file that exists.
+/// Returns whether both paths lead to one file that exists.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     FileId::at(a).is_some_and(|id| FileId::at(b) == Some(id))
 }

@@ -1,21 +1,21 @@
-//! The formats a marked map is written to: those whose drivers were seen to keep what they were given.
+//! The formats of marked maps: those whose drivers preserve what they write, as tests show.
 
 use crate::{Error, Result, decimals::Digits};
 use std::path::Path;
 
-/// A format, by GDAL's driver for it.
+/// A format and GDAL's driver for it.
 #[derive(Debug)]
 pub struct Format {
     /// GDAL's short name.
     pub driver: &'static str,
-    /// How the name of the file ends that bears the target's name, lower case.
+    /// The endings of the main file, lower case.
     endings: &'static [&'static str],
     /// Whether a file holds several layers.
     pub many_layers: bool,
     coordinates: Coordinates,
 }
 
-/// How coordinates are written.
+/// The encoding of coordinates.
 #[derive(Debug)]
 enum Coordinates {
     /// Bit by bit.
@@ -50,7 +50,7 @@ const FORMATS: &[Format] = &[
 type Options<'a> = &'a [(String, String)];
 
 impl Format {
-    /// The format that a user names, or that of the target's name.
+    /// Finds the format that the user names, or that of the target's name.
     pub fn find(named: Option<&str>, target: &Path) -> Result<&'static Format> {
         let target_name = target.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_meant = |format: &&Format| match named {
@@ -64,17 +64,19 @@ impl Format {
         })
     }
 
-    /// How the names of its files end.
+    /// Returns the ending of the names of its files.
     pub fn ending(&self) -> &'static str {
         self.endings[0]
     }
 
-    /// Whether the driver writes from the text of a GeoJSON file what features do not hold.
+    /// Returns whether the driver writes native data: the parts of a GeoJSON text that GDAL's features do not
+    /// hold.
     pub fn has_native_data(&self) -> bool {
         matches!(self.coordinates, Coordinates::Json { .. })
     }
 
-    /// Whether the driver brings a layer with these options into WGS 84, which would happen after the marking.
+    /// Returns whether the driver reprojects a layer with these options to WGS 84, which would happen after
+    /// the marking.
     pub fn is_wgs84_only(&self, layer_options: Options) -> bool {
         match self.coordinates {
             Coordinates::Binary => false,
@@ -87,7 +89,7 @@ impl Format {
         }
     }
 
-    /// The digits with which a layer with these options is written.
+    /// Returns the digits with which a layer with these options is written.
     pub fn digits(&self, layer_options: Options) -> Digits {
         let Coordinates::Json { always_rfc7946 } = self.coordinates else { return Digits::Every };
         let number = |name| value(layer_options, name).map(leading_number);
@@ -95,7 +97,7 @@ impl Format {
         let rfc7946 = || is_rfc7946.then_some(RFC7946_DECIMALS);
         let count = |number: i64| usize::try_from(number).ok();
         let decimals = match number("COORDINATE_PRECISION") {
-            // GeoJSONSeq takes what is given as it is, GeoJSON a negative number for none.
+            // GeoJSONSeq uses any given number; to GeoJSON a negative number means none.
             Some(given) => count(given).or_else(|| if always_rfc7946 { None } else { rfc7946() }),
             None => rfc7946(),
         };
@@ -109,10 +111,10 @@ impl Format {
 
 /// Decimals of RFC 7946, section 11.2, as GDAL writes them.
 const RFC7946_DECIMALS: usize = 7;
-/// GDAL's own choice.
+/// GDAL's default.
 const DEFAULT_DECIMALS: usize = 15;
 
-/// The whole number that a text begins with, or 0: as GDAL reads it.
+/// Returns the whole number at the start of a text, or 0, like GDAL.
 fn leading_number(text: &str) -> i64 {
     let digits = text.trim_start_matches(['+', '-']);
     let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());

@@ -1,12 +1,12 @@
-//! The text of GeoJSON: where in it positions and bounding boxes stand, so that they can be replaced and all else stays as
-//! it is written. GDAL keeps the text of a GeoJSON file as *native data*, and writes from it what its own model of
-//! features does not hold: ids, foreign members, a fourth ordinate (RFC 7946).
+//! The text of GeoJSON: this module finds positions and bounding boxes in it, so that they can be replaced
+//! and the rest stays unchanged. GDAL keeps the text of a GeoJSON file as *native data*, and writes from it
+//! what its own model of features does not hold: ids, foreign members, a fourth ordinate (RFC 7946).
 //!
-//! The text may hold NaN, which a parser of JSON refuses, so it is walked here; GDAL has parsed it before.
+//! The text may hold NaN, which a JSON parser refuses, so this module walks it; GDAL has parsed it before.
 
 use std::ops::Range;
 
-/// What GDAL calls native data that is GeoJSON.
+/// GDAL's media type of native data in GeoJSON.
 pub const MEDIA_TYPE: &str = "application/vnd.geo+json";
 
 /// A part of a text, as a range of its bytes.
@@ -14,12 +14,12 @@ pub const MEDIA_TYPE: &str = "application/vnd.geo+json";
 pub enum Place {
     /// `[ x, y, … ]`.
     Position(Range<usize>),
-    /// Of a geometry, a feature or a collection.
+    /// The bounding box of a geometry, a feature or a collection.
     BoundingBox(Range<usize>),
 }
 
-/// Where the positions and bounding boxes of a feature or a collection stand, in the order of the text. None when it is
-/// no object.
+/// Returns the positions and bounding boxes of a feature or a collection in the order of the text; `None`
+/// when it is not an object.
 pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     let mut places = Vec::new();
     for (key, value) in Text(text).members(0..text.len())? {
@@ -32,9 +32,10 @@ pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     Some(places)
 }
 
-/// The native data of a feature or a collection without what its features hold themselves, and hold otherwise once they
-/// are marked: attributes, bounding boxes, and positions but for ordinates after the third. Where there was a bounding
-/// box, GDAL makes a new one. None when nothing is left that GDAL would write.
+/// Returns the native data of a feature or a collection without the parts that change with the marking or
+/// that its features hold themselves: attributes, bounding boxes, and positions except for ordinates after
+/// the third. Where there was a bounding box, GDAL makes a new one. The result is `None` when nothing is left
+/// that GDAL would write.
 ///
 /// ```
 /// # use meshmark_dataset::geojson_text::without_places;
@@ -95,11 +96,11 @@ pub fn numbers(list: &[u8]) -> impl Iterator<Item = &[u8]> {
     inside.split(|byte| *byte == b',').map(<[u8]>::trim_ascii).filter(|number| !number.is_empty())
 }
 
-/// JSON; ranges are of values, without blanks around them.
+/// A JSON text; ranges are those of values without blanks around them.
 struct Text<'a>(&'a [u8]);
 
 impl<'a> Text<'a> {
-    /// Keys and values of an object.
+    /// Returns the keys and values of an object.
     fn members(&self, object: Range<usize>) -> Option<Vec<(&'a [u8], Range<usize>)>> {
         let mut members = Vec::new();
         let mut at = self.enter(object, b'{')?;
@@ -114,7 +115,7 @@ impl<'a> Text<'a> {
         Some(members)
     }
 
-    /// The values of an array.
+    /// Returns the values of an array.
     fn elements(&self, array: Range<usize>) -> Option<Vec<Range<usize>>> {
         let mut elements = Vec::new();
         let mut at = self.enter(array, b'[')?;
@@ -126,7 +127,7 @@ impl<'a> Text<'a> {
         Some(elements)
     }
 
-    /// Where the first value inside begins.
+    /// Returns where the first value inside begins.
     fn enter(&self, value: Range<usize>, bracket: u8) -> Option<usize> {
         let start = self.skip_blanks(value.start);
         (*self.0.get(start)? == bracket).then(|| self.skip_blanks(start + 1))
@@ -136,13 +137,13 @@ impl<'a> Text<'a> {
         at + self.0[at.min(self.0.len())..].iter().take_while(|byte| byte.is_ascii_whitespace()).count()
     }
 
-    /// Where the next value of an object or an array begins, or its end is.
+    /// Returns where the next value of an object or an array begins, or where it ends.
     fn next(&self, at: usize) -> usize {
         let at = self.skip_blanks(at);
         if self.0.get(at) == Some(&b',') { self.skip_blanks(at + 1) } else { at }
     }
 
-    /// Where the value ends that begins here.
+    /// Returns the end of the value that begins at `start`.
     fn end_of(&self, start: usize) -> Option<usize> {
         let (mut at, mut depth, mut in_text) = (start, 0_usize, false);
         loop {
@@ -199,7 +200,7 @@ impl<'a> Text<'a> {
         Some(())
     }
 
-    /// Whether a geometry has what GDAL's model does not hold.
+    /// Returns whether a geometry has parts that GDAL's model does not hold.
     fn says_more(&self, geometry: &Range<usize>) -> Option<bool> {
         if !self.is(geometry, b'{') {
             return Some(false);

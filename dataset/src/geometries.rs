@@ -10,19 +10,18 @@ use std::collections::BTreeMap;
 /// A geometry.
 #[derive(Debug, Clone)]
 pub struct Outline {
-    /// Well-known binary as it was read; none when the chains are all that is known.
+    /// The well-known binary that was read; `None` when only the chains are known.
     wkb: Option<Vec<u8>>,
-    /// Its rings, lines and points: coordinates in CRS units, a ring closed by its first one.
+    /// Its rings, lines and points: coordinates in CRS units; a ring ends with its first one.
     pub chains: Vec<Vec<[f64; 2]>>,
-    /// What each of them is.
+    /// The kind of each of them.
     pub kinds: Vec<Step>,
 }
 
 impl Outline {
-    /// Of well-known binary.
+    /// Reads well-known binary.
     ///
-    /// # Errors
-    /// Bytes that are not a geometry.
+    /// # Errors Fails for bytes that are not a geometry.
     pub fn of_wkb(mut wkb: Vec<u8>) -> Result<Self, WkbError> {
         let (mut chains, mut kinds): (Vec<Vec<[f64; 2]>>, _) = (Vec::new(), Vec::new());
         wkb::map_coordinates::<WkbError>(&mut wkb, &mut |step, point| {
@@ -38,7 +37,7 @@ impl Outline {
         Ok(Outline { wkb: Some(wkb), chains, kinds })
     }
 
-    /// As GDAL's geometry; none when GDAL cannot make one.
+    /// Returns the geometry of GDAL; `None` when GDAL cannot make one.
     pub(crate) fn geometry(&self) -> Option<Geometry> {
         match &self.wkb {
             Some(wkb) => Geometry::from_wkb(wkb).ok(),
@@ -46,28 +45,29 @@ impl Outline {
         }
     }
 
-    /// Whether its chains are all of it: no arcs, no collections.
+    /// Returns whether its chains describe it completely: it has no arcs and no collections.
     pub(crate) fn is_plain(&self) -> bool {
         self.wkb.as_deref().is_none_or(wkb::is_plain)
     }
 
-    /// Its first vertex.
+    /// Returns its first vertex.
     pub fn first(&self) -> Option<[f64; 2]> {
         self.chains.first()?.first().copied()
     }
 }
 
-/// The geometries of a map, made of its vertices: a few bytes for every coordinate.
+/// The geometries of a map as references to its vertices, a few bytes for every coordinate.
 #[derive(Debug, Clone)]
 pub struct Geometries {
-    /// Of every coordinate its vertex.
+    /// The vertex of every coordinate.
     indices: Vec<u32>,
-    /// Where in `indices` each chain starts, ascending.
+    /// The index in `indices` where each chain starts, ascending.
     starts: Vec<u32>,
     kinds: Vec<Step>,
-    /// Which of the chains is the first of each geometry, ascending.
+    /// The number of the first chain of each geometry, ascending.
     firsts: Vec<u32>,
-    /// Those that are not of points, lines or polygons, as well-known binary: chains do not tell all of them.
+    /// Geometries other than points, lines and polygons, as well-known binary: their chains do not describe
+    /// them completely.
     others: BTreeMap<u32, Vec<u8>>,
 }
 
@@ -77,17 +77,17 @@ impl Geometries {
         Geometries { indices, starts, kinds, firsts, others }
     }
 
-    /// How many there are, empty ones included.
+    /// Returns how many there are, empty ones included.
     pub fn len(&self) -> usize {
         self.firsts.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     pub fn is_empty(&self) -> bool {
         self.firsts.is_empty()
     }
 
-    /// A geometry with the vertices at these places, in canonical order, without Z and M.
+    /// Returns a geometry with the vertices at `coords`, which are in canonical order, without Z and M.
     pub fn outline(&self, number: usize, coords: &[[f64; 2]]) -> Outline {
         let end =
             |ends: &[u32], number: usize, all: usize| ends.get(number + 1).map_or(all, |end| *end as usize);
@@ -103,7 +103,7 @@ impl Geometries {
     }
 }
 
-/// The same geometry with its coordinates at these places.
+/// Returns the same geometry with its coordinates at these places.
 fn with_places(wkb: &[u8], chains: &[Vec<[f64; 2]>]) -> Vec<u8> {
     let (mut wkb, mut places) = (wkb.to_vec(), chains.iter().flatten());
     let place = &mut |_, point| Ok(places.next().copied().unwrap_or(point));

@@ -1,17 +1,17 @@
-//! Geometries as GeoPackages hold them (OGC 12-128r18, 2.1.3): a header, mostly with the bounding box, and well-known
-//! binary behind it.
+//! Geometries in GeoPackages (OGC 12-128r18, 2.1.3): a header, usually with the bounding box, followed by
+//! well-known binary.
 
 use crate::wkb::{self, WkbError};
 use gdal::vector::Geometry;
 use std::borrow::Cow;
 
-/// How the names of tables begin that are the standard's, SQLite's, or those of spatial indexes.
+/// Prefixes of the tables of the standard, of SQLite and of spatial indexes.
 const RESERVED: [&str; 3] = ["gpkg", "sqlite_", "rtree_"];
 
-/// What GDAL lets no name of a GeoPackage's layer begin with.
+/// Characters with which GDAL lets no name of a GeoPackage layer begin.
 const NO_BEGINNING: &str = "`~!@#$%^&*()+-={}|[]\\:\";'<>?,./";
 
-/// The name under which a GeoPackage takes a layer of this name, which other formats may call as they like.
+/// Returns a name that a GeoPackage accepts for a layer of this name; other formats allow more names.
 pub fn safe_layer_name(name: &str) -> Cow<'_, str> {
     let begins = |start: &&str| name.get(..start.len()).is_some_and(|n| n.eq_ignore_ascii_case(start));
     match name.is_empty() || name.starts_with(|c| NO_BEGINNING.contains(c)) || RESERVED.iter().any(begins) {
@@ -23,16 +23,15 @@ pub fn safe_layer_name(name: &str) -> Cow<'_, str> {
 /// A bounding box in the order of GeoPackages: least x, largest x, least y, largest y.
 pub type Bounds = [f64; 4];
 
-/// Where the bounding box begins, if there is one.
+/// The offset of the bounding box, if there is one.
 const BOUNDS: usize = 8;
-/// How many numbers the header ends with, for every kind of bounding box.
+/// The number of numbers at the end of the header, for every kind of bounding box.
 const NUMBERS: [usize; 5] = [0, 4, 6, 6, 8];
 
-/// Calls `f` with every coordinate pair, writes back what it returns and makes the bounding box fit along x and y:
-/// which it then is, none for a geometry without coordinates.
+/// Calls `f` with every coordinate pair, writes the result back and fits the bounding box along x and y.
+/// Returns the box, or `None` for a geometry without coordinates.
 ///
-/// # Errors
-/// [`WkbError`] for bytes that are no such geometry, `f`'s own error when it fails.
+/// # Errors [`WkbError`] for bytes that are not such a geometry, the error of `f` when it fails.
 pub fn map_coordinates<E: From<WkbError>>(
     blob: &mut [u8],
     f: &mut impl FnMut([f64; 2]) -> Result<[f64; 2], E>,
@@ -62,7 +61,7 @@ pub fn map_coordinates<E: From<WkbError>>(
 mod tests {
     use super::*;
 
-    /// A geometry with a header of that kind of bounding box, all zeros, and the wkb of a text.
+    /// Returns a geometry whose header has that kind of bounding box, all zeros, and the WKB of a text.
     fn blob(kind: u8, wkt: &str) -> Vec<u8> {
         let mut blob = vec![b'G', b'P', 0, kind << 1 | 1, 0, 0, 0, 0];
         blob.resize(BOUNDS + 8 * NUMBERS[usize::from(kind)], 0);

@@ -1,11 +1,12 @@
-//! The names of marked views: `MESHMARK:` and the name of a dataset open that dataset with marked geometry.
+//! The names of marked views: `MESHMARK:` followed by the name of a dataset opens that dataset with marked
+//! geometry.
 
 use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
 
-/// What the name of a marked view begins with, in any case; `plugin/cpp/shim.h` has the same.
+/// The prefix of the name of a marked view, in any case. `plugin/cpp/shim.h` has the same.
 pub const PREFIX: &str = "MESHMARK:";
 
-/// Whether this is the name of a marked view.
+/// Returns whether this is the name of a marked view.
 pub fn is_named_by(name: impl AsRef<OsStr>) -> bool {
     let start = name.as_ref().as_bytes().get(..PREFIX.len());
     start.is_some_and(|start| start.eq_ignore_ascii_case(PREFIX.as_bytes()))

@@ -1,4 +1,4 @@
-//! A marking, apart from where its source comes from and where its result goes.
+//! The parts of a marking that do not depend on its source and its target.
 
 use crate::{
     CoordinateSystem, Error, Geometries, Result, Survey,
@@ -22,7 +22,7 @@ use meshmark_core::{
 };
 use std::borrow::Cow;
 
-/// Where the vertices of a map go.
+/// The movement of the vertices of a map.
 #[derive(Clone, Copy)]
 pub struct Moves<'a> {
     /// The vertices.
@@ -32,15 +32,14 @@ pub struct Moves<'a> {
 }
 
 impl Moves<'_> {
-    /// Where a vertex goes; none when it is no vertex of the map.
+    /// Returns the new place of a vertex; `None` when it is no vertex of the map.
     pub fn destination(&self, point: [f64; 2]) -> Option<[f64; 2]> {
         self.from.index_of(point).map(|index| self.to[index])
     }
 
-    /// Moves every coordinate of a WKB geometry; how many there are.
+    /// Moves every coordinate of a WKB geometry and returns their number.
     ///
-    /// # Errors
-    /// A coordinate that is no vertex of the map, bytes that are not a geometry.
+    /// # Errors Fails for a coordinate that is no vertex of the map and for bytes that are not a geometry.
     pub fn geometry(&self, bytes: &mut [u8]) -> std::result::Result<usize, NotMoved> {
         let mut count = 0;
         wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {
@@ -57,18 +56,18 @@ pub enum NotMoved {
     /// Its coordinate is not in the table.
     #[error("({}, {}) was not there when the map was read", .0[0], .0[1])]
     UnknownVertex([f64; 2]),
-    /// Its bytes make no sense.
+    /// Its bytes are malformed.
     #[error(transparent)]
     Wkb(#[from] wkb::WkbError),
 }
 
-/// Smaller than so many tolerances a map would be noise after its marking.
+/// A map smaller than this many tolerances would be noise after its marking.
 const LEAST_TOLERANCES: f64 = 10.0;
 
-/// Where coordinates as text are looked for: some of a layer's features may have none.
+/// Number of features per layer in which coordinates as text are searched: some features may have none.
 const FEATURES_TO_LOOK_AT: usize = 100;
 
-/// Fails for a map so small that its units cannot be meant.
+/// Fails for a map so small that its units must be wrong.
 ///
 /// # Errors
 /// [`Error::TooSmall`].
@@ -83,7 +82,7 @@ pub fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
     }
 }
 
-/// Fails where the one scale of the mark is wrong, so that vertices would move further than is asked for.
+/// Fails where the error of the mark's one scale is so large that vertices would move further than wanted.
 ///
 /// # Errors
 /// [`Error::UnevenScale`].
@@ -97,7 +96,7 @@ pub fn check_scale(map: &Map, crs: Option<&CoordinateSystem>) -> Result<()> {
     }
 }
 
-/// What is legal and probably not meant.
+/// Returns warnings about what is legal and probably not intended.
 pub fn warnings(
     parameters: &Parameters,
     message: &Message,
@@ -134,15 +133,16 @@ pub fn warnings(
     warnings
 }
 
-/// CSV files keep no column of coordinates as text among the attributes.
+/// With this option CSV files keep no column of coordinates as text among the attributes.
 const NO_TEXT_OF_GEOMETRY: &str = "@KEEP_GEOM_COLUMNS=NO";
 
-/// How any map is opened. CSV files hold their coordinates as text, which otherwise stays an attribute, and unmarked; of
-/// OpenStreetMap files layers must be read one at a time, whatever the configuration says. With @ an option concerns
-/// only drivers that have it.
+/// The open options for any map. CSV files hold their coordinates as text, which would otherwise stay an
+/// attribute, and unmarked; layers of OpenStreetMap files must be read one at a time, whatever the
+/// configuration. With @ an option concerns only drivers that have it.
 pub const OPEN_OPTIONS: [&str; 2] = [NO_TEXT_OF_GEOMETRY, "@INTERLEAVED_READING=NO"];
 
-/// What was read from a CSV file may have its coordinates among the attributes too, and those stay unmarked.
+/// Returns a warning for a dataset with coordinates as text among its attributes, where they stay unmarked. A
+/// dataset from a CSV file may have them.
 pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     let find = |mut layer: Layer| {
         let _turn = turn(dataset, &layer.name()).ok()?;
@@ -177,7 +177,7 @@ fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
     found
 }
 
-/// What the record says about the map.
+/// Returns the record's description of the reference map.
 pub fn reference(map: &Survey, patches: usize) -> Reference {
     Reference {
         vertices: map.data.vertices.len(),
@@ -187,7 +187,7 @@ pub fn reference(map: &Survey, patches: usize) -> Reference {
     }
 }
 
-/// The unmarked geometries of a map, to which any marked copy is compared.
+/// The unmarked geometries of a map, with which marked copies are compared.
 pub struct Unmarked<'a> {
     geometries: &'a Geometries,
     coords: &'a [[f64; 2]],
@@ -196,7 +196,7 @@ pub struct Unmarked<'a> {
 }
 
 impl<'a> Unmarked<'a> {
-    /// Looks at all geometries of a map.
+    /// Measures all geometries of a map.
     pub fn new(geometries: &'a Geometries, map: &Map<'a>) -> Self {
         let coords = map.vertices.coords();
         let state =
@@ -204,7 +204,7 @@ impl<'a> Unmarked<'a> {
         Unmarked { geometries, coords, measure: map.measure(), state }
     }
 
-    /// What marking changed.
+    /// Returns the distortion of a marked copy.
     pub fn distortion(&self, marked: &Marked, parameters: &Parameters) -> Distortion {
         let get_before = |number| Cow::Owned(self.geometries.outline(number, self.coords));
         let get_after = |number| Cow::Owned(self.geometries.outline(number, &marked.coords));
@@ -237,7 +237,7 @@ fn outlines<'a>(
     Outlines { count: geometries.len(), get }
 }
 
-/// The record of a marking.
+/// Returns the record of a marking.
 pub fn record(
     options: &Options,
     subject: &Subject,

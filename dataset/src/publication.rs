@@ -1,9 +1,9 @@
-//! Publication: files made in workplaces appear in their places together, or none does.
+//! Publication: files made in workplaces appear in their places together, or none of them does.
 //!
-//! The order is record, reference, side files, main file; so whoever sees the main file finds the others.
-//! New files are linked, not moved, so that a publication that was cut short can be told from one that was
-//! not, and undone: the same file is then in both places. The main file alone may replace another one, by a
-//! single rename. Side files that are in the way are moved into the workplace first, and back when it fails.
+//! The order is record, reference, side files, main file; so a reader that sees the main file finds the
+//! others. New files are linked, not moved: a file in both places shows that a publication was interrupted,
+//! and the publication can be undone. The main file alone may replace another one, by a single rename. Side
+//! files in the way are moved into the workplace first, and back if the publication fails.
 
 use crate::{Error, Result, error::file_error, file_id::same_file};
 use std::{
@@ -14,15 +14,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The file of a workplace that says what is being published, while it is.
+/// The file of a workplace that describes a publication while it runs.
 pub const JOURNAL: &str = "journal";
 
-/// What is to be published.
+/// The files of a publication.
 #[derive(Debug, Default)]
 pub struct Publication {
-    /// Record, reference, side files: from where in a workplace to which place, where nothing may be.
+    /// Moves of record, reference and side files from a workplace to their places, which must be free.
     pub companions: Vec<Move>,
-    /// Files of a dataset that is replaced: from their place to where they are kept meanwhile.
+    /// Moves of the files of a replaced dataset from their places to where they are kept meanwhile.
     pub retired: Vec<Move>,
     /// The main file.
     pub main: Move,
@@ -30,17 +30,17 @@ pub struct Publication {
     pub overwrite: bool,
 }
 
-/// From where to where.
+/// A move of a file.
 #[derive(Debug, Default, PartialEq, Clone)]
 pub struct Move {
-    /// The path it has.
+    /// Its present path.
     pub from: PathBuf,
-    /// The path it gets.
+    /// Its new path.
     pub to: PathBuf,
 }
 
 impl Publication {
-    /// Publishes all, or leaves everything as it was. `workplace` is that of the main file.
+    /// Publishes all files, or leaves everything unchanged. `workplace` is that of the main file.
     pub fn run(&self, workplace: &Path) -> Result<()> {
         self.sync_content()?;
         let journal = workplace.join(JOURNAL);
@@ -66,12 +66,13 @@ impl Publication {
             true => fs::rename(&self.main.from, &self.main.to)
                 .map_err(|e| file_error("replacing", &self.main.to, e))?,
         }
-        // It is there: nothing may fail any more. Should the power fail now, then old and new are both whole.
+        // The main file is in its place, so nothing may fail any more. If the power fails now, old and new
+        // files are both whole.
         drop(sync_folder(&self.main.to));
         Ok(())
     }
 
-    /// Whether the main file is in its place.
+    /// Returns whether the main file is in its place.
     fn is_done(&self) -> bool {
         !self.main.from.exists() || same_file(&self.main.from, &self.main.to)
     }
@@ -89,7 +90,7 @@ impl Publication {
         }
     }
 
-    /// A power failure after the names are in place must not find them empty.
+    /// Writes the content to disk: a power failure after the names are in place must not leave empty files.
     fn sync_content(&self) -> Result<()> {
         for Move { from, .. } in self.companions.iter().chain([&self.main]) {
             File::open(from).and_then(|file| file.sync_all()).map_err(|e| file_error("writing", from, e))?;
@@ -97,7 +98,7 @@ impl Publication {
         Ok(())
     }
 
-    /// Kind, from, to; each ended by NUL, which no path contains.
+    /// Encodes every move as kind, from and to, each ended by NUL, which no path contains.
     fn to_bytes(&self) -> Vec<u8> {
         let lists = [
             ("new", &self.companions[..]),
@@ -116,7 +117,7 @@ impl Publication {
         bytes
     }
 
-    /// None when it was not written to its end: then nothing was published.
+    /// Decodes a journal; `None` when it was not written to its end, as then nothing was published.
     fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let texts: Vec<&[u8]> = bytes.strip_suffix(&[0])?.split(|&byte| byte == 0).collect();
         let path = |text: &[u8]| PathBuf::from(OsStr::from_bytes(text));
@@ -136,7 +137,7 @@ impl Publication {
     }
 }
 
-/// Undoes what a killed process published without its main file.
+/// Undoes the publication of a killed process unless its main file is in place.
 pub fn recover(workplace: &Path) {
     let publication =
         fs::read(workplace.join(JOURNAL)).ok().and_then(|bytes| Publication::from_bytes(&bytes));
@@ -145,7 +146,7 @@ pub fn recover(workplace: &Path) {
     }
 }
 
-/// Another name for a file, in a place where nothing is.
+/// Links a file to a free place.
 fn link(Move { from, to }: &Move) -> Result<()> {
     fs::hard_link(from, to).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => {

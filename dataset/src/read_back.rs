@@ -1,7 +1,7 @@
-//! Reading back: what is in the file is what was meant.
+//! Reading back: this module checks that a file holds what was meant.
 //!
-//! Drivers of GDAL may fail without a word, and formats round, turn rings around and change the order of
-//! features; so the features of the file that was written are compared with those that were meant.
+//! Drivers of GDAL may fail silently, and formats round coordinates, reverse rings and reorder features; so
+//! the features of the written file are compared with those that were meant.
 
 use crate::{
     decimals::Digits,
@@ -14,19 +14,19 @@ use std::{
     hash::{DefaultHasher, Hash, Hasher},
 };
 
-/// How a layer of a file differs from what was meant.
+/// The difference between a layer of a file and what was meant.
 #[derive(Debug)]
 pub enum Difference {
-    /// It has another number of features; so many of those that were meant have no coordinates.
+    /// The numbers of features differ; some of the meant features have no coordinates.
     Features {
         /// How many features were meant.
         meant: usize,
-        /// How many there are.
+        /// How many features the file has.
         in_file: usize,
-        /// How many of those that were meant have a null or an empty geometry.
+        /// How many of the meant features have a null or an empty geometry.
         without_geometry: usize,
     },
-    /// Anything else, in a few words.
+    /// Any other difference, in a few words.
     Other(String),
 }
 
@@ -53,7 +53,7 @@ impl fmt::Display for Difference {
 }
 
 impl Difference {
-    /// What to do about it.
+    /// Returns the remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Difference::Features { without_geometry: 1.., .. } => {
@@ -64,7 +64,7 @@ impl Difference {
     }
 }
 
-/// How many features there are.
+/// The numbers of features.
 #[derive(Default)]
 struct Counts {
     meant: usize,
@@ -88,13 +88,13 @@ impl Counts {
     }
 }
 
-/// How to compare a layer of a file with what was meant.
+/// The comparison of a layer of a file with what was meant.
 pub struct ReadBack<'a> {
     /// The digits with which the layer is written.
     pub digits: Digits,
-    /// Where a coordinate of the first layer was meant to be; none when nobody knows.
+    /// The meant place of a coordinate of the first layer; `None` when it is unknown.
     pub place: &'a dyn Fn([f64; 2]) -> Option<[f64; 2]>,
-    /// What GDAL's last failure on this thread was, if there was one since the comparison began.
+    /// Returns GDAL's last failure on this thread since the comparison began, if there was one.
     pub last_failure: &'a dyn Fn() -> Option<String>,
 }
 
@@ -128,7 +128,7 @@ impl ReadBack<'_> {
             }
             let (Some(a), Some(b)) = (a, b) else { continue };
             if self.digits == Digits::Every {
-                // The order of features may be another one: what is in all of them counts.
+                // The order of features may differ, so sums over all features are compared.
                 sums[0] = sums[0].wrapping_add(digest(a));
                 sums[1] = sums[1].wrapping_add(digest(b));
             } else if kept.is_ok() {
@@ -145,7 +145,7 @@ impl ReadBack<'_> {
         }
     }
 
-    /// Compares a layer with coordinates in the order of its features, not one bit of which may differ.
+    /// Compares a layer with coordinates in the order of its features, bit by bit.
     ///
     /// # Errors
     /// The difference.
@@ -186,7 +186,7 @@ impl ReadBack<'_> {
 
 fn coords(feature: &Feature) -> Result<Vec<[f64; 2]>, String> {
     let mut coords = Vec::new();
-    // What is written has one geometry column; a null geometry has no coordinates.
+    // A written layer has one geometry column; a null geometry has no coordinates.
     if let Ok(geometry) = feature.geometry_by_index(0) {
         let mut bytes = geometry.iso_wkb().map_err(|error| error.to_string())?;
         let mut visit = |_, point: [f64; 2]| {
@@ -198,7 +198,7 @@ fn coords(feature: &Feature) -> Result<Vec<[f64; 2]>, String> {
     Ok(coords)
 }
 
-/// A digest of coordinates in any order: formats turn rings around.
+/// Returns a digest of coordinates in any order, as formats reverse rings.
 fn digest(mut coords: Vec<[f64; 2]>) -> u64 {
     coords.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let mut hasher = DefaultHasher::new();

@@ -1,4 +1,4 @@
-//! What to read of a dataset, and how.
+//! What to read of a dataset, and how to read it.
 
 use crate::{CoordinateSystem, Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
@@ -28,38 +28,38 @@ impl LabelFields<'_> {
     }
 }
 
-/// Which CRS coordinates are read in.
+/// The CRS in which coordinates are read.
 #[derive(Debug, Clone, Copy)]
 pub enum TargetCrs<'a> {
     /// Their own, which all chosen layers must share.
     Own,
-    /// This one: layers in another CRS are reprojected.
+    /// This one; layers in another CRS are reprojected.
     Crs(&'a CoordinateSystem),
-    /// Whatever they are in: the numbers as they stand.
+    /// None: the numbers are read unchanged.
     Raw,
 }
 
-/// What to read of a dataset, and how.
+/// What to read of a dataset, and how to read it.
 #[derive(Clone, Copy)]
 pub struct Selection<'a> {
     /// Layers that form the map; all when `None`.
     pub layers: Option<&'a [String]>,
     /// CRS of a source that has none.
     pub srs: Option<&'a str>,
-    /// Attributes to take along.
+    /// Attributes that become labels.
     pub labels: LabelFields<'a>,
-    /// Which CRS the coordinates shall be in.
+    /// The CRS in which coordinates are read.
     pub target: TargetCrs<'a>,
-    /// Whether to keep what the geometries are made of.
+    /// Whether to keep the geometries.
     pub geometries: bool,
-    /// Refuse a map of more vertices, duplicates included.
+    /// A map of more vertices, duplicates included, is refused.
     pub most_vertices: usize,
-    /// What GDAL's last failure was, if there was one since the walk began: drivers end a layer early on a
-    /// read error, and only the process's error handler tells that from its end.
+    /// Returns GDAL's last failure since the walk began, if there was one: drivers end a layer early on a
+    /// read error, and only the error handler of the process distinguishes that from the end of the layer.
     pub last_failure: &'a dyn Fn() -> Option<String>,
 }
 
-/// The whole map, without attributes, in its own CRS.
+/// Selects the whole map, without attributes, in its own CRS.
 impl Default for Selection<'_> {
     fn default() -> Self {
         Selection {
@@ -74,7 +74,7 @@ impl Default for Selection<'_> {
     }
 }
 
-/// Number and name of the chosen layers, in the dataset's order. Two layers may have one name.
+/// Returns number and name of the chosen layers, in the order of the dataset. Two layers may have one name.
 pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
     let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
     if known.is_empty() {

@@ -3,18 +3,18 @@ use std::{
     thread::{Builder, JoinHandle, available_parallelism},
 };
 
-/// How many threads GDAL's users allow: the configuration option GDAL_NUM_THREADS, a number or ALL_CPUS, which is also
-/// the default.
+/// Returns how many threads the user of GDAL allows: the configuration option GDAL_NUM_THREADS, a number or
+/// ALL_CPUS, which is the default.
 pub fn threads() -> usize {
     let all = available_parallelism().map_or(1, usize::from);
     let given = gdal::config::get_config_option("GDAL_NUM_THREADS", "").unwrap_or_default();
     given.parse().map_or(all, |threads: usize| threads.clamp(1, 256))
 }
 
-/// Threads that have ended when this is dropped. Those of rayon's own pool end some time later, maybe while the process
-/// ends: GDAL then has no storage for them any more, and complains.
+/// A pool whose threads have ended when it is dropped. Those of rayon's own pool end later, possibly while
+/// the process ends, when GDAL has released its storage for them and reports an error.
 pub struct ThreadPool {
-    /// Declared first, so that the threads are told to end before they are waited for.
+    /// Declared first, so that the threads are asked to end before they are awaited.
     pool: rayon::ThreadPool,
     _threads: Joined,
 }
@@ -22,8 +22,7 @@ pub struct ThreadPool {
 impl ThreadPool {
     /// Starts `threads` threads. Each runs `start` first and `end` last.
     ///
-    /// # Errors
-    /// The system gives no more threads.
+    /// # Errors Fails when the system provides no more threads.
     pub fn new(threads: usize, start: fn(), end: fn()) -> io::Result<Self> {
         let mut started = Joined(Vec::with_capacity(threads));
         let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -42,12 +41,12 @@ impl ThreadPool {
     }
 }
 
-/// Waits for its threads, thread-local storage and all, when it is dropped.
+/// Waits for its threads, and for their thread-local storage, when it is dropped.
 struct Joined(Vec<JoinHandle<()>>);
 
 impl Drop for Joined {
     fn drop(&mut self) {
-        // A thread that panicked has ended, too.
+        // A thread that panicked has ended as well.
         self.0.drain(..).for_each(|thread| drop(thread.join()));
     }
 }
@@ -61,7 +60,7 @@ mod tests {
         time::Duration,
     };
 
-    /// What a thread has of its own, as GDAL's storage is: it goes when the thread ends, and that takes its time.
+    /// Thread-local storage, like that of GDAL: it is released slowly when the thread ends.
     struct Storage;
 
     static ENDED: AtomicUsize = AtomicUsize::new(0);

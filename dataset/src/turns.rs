@@ -1,4 +1,4 @@
-//! Layers one after the other, also of a format that hands out the features of all of them in turn.
+//! Reading layers one after the other, also from a format that interleaves the features of all layers.
 
 use crate::Result;
 use gdal::{
@@ -6,15 +6,16 @@ use gdal::{
     vector::sql::{Dialect, ResultSet},
 };
 
-/// The driver of OpenStreetMap files. It meets the features of all layers in one pass over the file, keeps those whose
-/// turn has not come, and gives up when it has to keep many.
+/// The driver of OpenStreetMap files. It reads the features of all layers in one pass over the file, keeps
+/// those of other layers in memory, and fails when these become many.
 const IN_TURN: &str = "OSM";
 
-/// While the result lives, the layer of this name can be read from its start to its end.
+/// Makes the layer of this name readable from its start to its end while the result lives.
 pub(crate) fn turn<'a>(dataset: &'a Dataset, layer: &str) -> Result<Option<ResultSet<'a>>> {
     if dataset.driver().short_name() != IN_TURN {
         return Ok(None);
     }
-    // For as long as a query is open, that driver starts anew and makes features of the query's layers only.
+    // While a query is open, that driver starts from the beginning and creates features of the query's layers
+    // only.
     Ok(dataset.execute_sql(format!("SELECT * FROM \"{layer}\""), None, Dialect::DEFAULT)?)
 }

@@ -1,7 +1,7 @@
-//! Well-known binary geometries (OGC 06-103r4, ISO 13249-3): every coordinate pair in place, Z and M
-//! untouched, all geometry types.
+//! Well-known binary geometries (OGC 06-103r4, ISO 13249-3): this module changes coordinate pairs of all
+//! geometry types in place and leaves Z and M unchanged.
 
-/// What is wrong with a geometry's bytes.
+/// The errors of the bytes of a geometry.
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum WkbError {
@@ -17,7 +17,8 @@ pub enum WkbError {
 
 const MOST_NESTED: usize = 64;
 
-/// Whether a coordinate pair begins a sequence (ring, line, point) or is joined to the one before it.
+/// The role of a coordinate pair: it begins a sequence (ring, line, point) or is joined to the pair before
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
     /// The first pair of a line, or a point.
@@ -30,11 +31,10 @@ pub enum Step {
     Next,
 }
 
-/// Calls `f` with every coordinate pair of a geometry and writes back what it returns. An empty point
-/// (NaN NaN) has none.
+/// Calls `f` with every coordinate pair of a geometry and writes the result back. An empty point (NaN NaN)
+/// has none.
 ///
-/// # Errors
-/// [`WkbError`] for bytes that are not a geometry, `f`'s own error when it fails.
+/// # Errors [`WkbError`] for bytes that are not a geometry, the error of `f` when it fails.
 pub fn map_coordinates<E: From<WkbError>>(
     wkb: &mut [u8],
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
@@ -42,8 +42,8 @@ pub fn map_coordinates<E: From<WkbError>>(
     Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
 }
 
-/// The bytes of a geometry of these chains, each with what it begins as: polygons with their holes, lines, and points
-/// for what has one vertex; a multi-geometry or a collection when there are several.
+/// Encodes a geometry of these chains, each with the kind of its first step: polygons with their holes,
+/// lines, and points for chains of one vertex; several form a multi-geometry or a collection.
 pub fn of_chains(chains: &[Vec<[f64; 2]>], kinds: &[Step]) -> Vec<u8> {
     let mut parts: Vec<(u32, Vec<u8>)> = Vec::new();
     let mut rest = chains.iter().zip(kinds).peekable();
@@ -90,8 +90,8 @@ fn sequence_bytes(chain: &[[f64; 2]]) -> Vec<u8> {
     bytes
 }
 
-/// Whether a legal geometry is of points, lines or polygons. All others may have arcs, which are more than their
-/// coordinates.
+/// Returns whether a legal geometry consists of points, lines or polygons. All others may have arcs, which
+/// coordinates alone do not describe.
 pub(crate) fn is_plain(wkb: &[u8]) -> bool {
     let code = wkb.get(1..5).and_then(|code| code.try_into().ok()).unwrap_or_default();
     let code = if wkb.first() == Some(&1) { u32::from_le_bytes(code) } else { u32::from_be_bytes(code) };
@@ -204,7 +204,7 @@ impl Layout {
     }
 }
 
-/// The flat type and the number of ordinates of an ISO or extended type code.
+/// Returns the flat type and the number of ordinates of an ISO or extended type code.
 fn decode_type(code: u32) -> (u32, usize) {
     let flags = usize::from(code & 0x8000_0000 != 0) + usize::from(code & 0x4000_0000 != 0);
     let iso = code & 0x0fff_ffff;

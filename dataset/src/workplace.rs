@@ -1,8 +1,9 @@
-//! Workplaces: private folders beside the files to be published, in which they are made first.
+//! Workplaces: private folders beside the places of files, in which the files are made before their
+//! publication.
 //!
-//! A workplace belongs to the process that holds the lock in it. One whose lock is free was left by a
-//! process that was killed: whoever next writes to that place undoes what was half published
-//! ([`crate::publication::recover`]) and removes it.
+//! A workplace belongs to the process that holds the lock in it. A workplace whose lock is free was left by a
+//! killed process: the next process that writes to the same folder undoes a partial publication
+//! ([`crate::publication::recover`]) and removes the workplace.
 
 pub use crate::error::file_error;
 
@@ -23,19 +24,19 @@ const LOCK: &str = "lock";
 /// Names the other workplaces of the same publication, each ended by NUL.
 const PEERS: &str = "peers";
 
-/// A private folder that disappears with this.
+/// A private folder that is removed when this is dropped.
 pub struct Workplace {
     folder: PathBuf,
     _lock: File,
 }
 
 impl Workplace {
-    /// Removes what killed processes left in `parent` and makes a workplace there.
+    /// Removes the workplaces of killed processes in `parent` and makes a workplace there.
     pub fn new(parent: &Path) -> Result<Self> {
         let failed = |e: io::Error| file_error("writing into", parent, e);
         let parent = parent.canonicalize().map_err(failed)?;
         loop {
-            // What is staged is unmarked: it is nobody else's to read.
+            // Staged files are unmarked, so no other user may read them.
             let private = Permissions::from_mode(0o700);
             let folder = tempfile::Builder::new().prefix(PREFIX).permissions(private).tempdir_in(&parent);
             let folder = folder.map_err(failed)?.keep();
@@ -53,19 +54,19 @@ impl Workplace {
         }
     }
 
-    /// The folder.
+    /// Returns the folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// A folder in it.
+    /// Makes a folder in it.
     pub fn subfolder(&self, name: &str) -> Result<PathBuf> {
         let path = self.folder.join(name);
         fs::create_dir(&path).map_err(|e| file_error("making", &path, e))?;
         Ok(path)
     }
 
-    /// Notes that both belong to one publication.
+    /// Records that both workplaces belong to one publication.
     pub fn join(&self, other: &Workplace) -> Result<()> {
         for (one, other) in [(self, other), (other, self)] {
             let path = one.folder.join(PEERS);
@@ -80,13 +81,13 @@ impl Workplace {
 
 impl Drop for Workplace {
     fn drop(&mut self) {
-        // Without its journal nobody takes it for a publication that was cut short.
+        // Without its journal it does not count as an interrupted publication.
         drop(fs::remove_file(self.folder.join(publication::JOURNAL)));
         drop(fs::remove_dir_all(&self.folder));
     }
 }
 
-/// The folder a file is in, or would be.
+/// Returns the folder of a file, which need not exist.
 pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -94,7 +95,7 @@ pub fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Removes the workplaces in `parent` whose processes are gone; those of other users are theirs.
+/// Removes the workplaces in `parent` whose processes have ended, except those of other users.
 fn sweep(parent: &Path, user: u32) {
     let Ok(entries) = fs::read_dir(parent) else { return };
     for entry in entries.flatten() {
@@ -104,12 +105,13 @@ fn sweep(parent: &Path, user: u32) {
 
 fn sweep_one(folder: &Path, user: u32) {
     let is_workplace = folder.file_name().is_some_and(|name| name.as_bytes().starts_with(PREFIX.as_bytes()));
-    // Not through links: nobody shall have us remove what is elsewhere.
+    // Links are not followed, so that nobody can have files elsewhere removed.
     let is_ours = |m: fs::Metadata| m.is_dir() && m.uid() == user && m.mode() & 0o077 == 0;
     if !is_workplace || !folder.symlink_metadata().is_ok_and(is_ours) {
         return;
     }
-    // Without a lock it is empty, and perhaps about to be locked, or its owner died while removing it.
+    // A workplace without a lock is empty and possibly about to be locked, or its process was killed while it
+    // removed it.
     let lock = || File::open(folder.join(LOCK)).ok();
     let Some(file) = lock().or_else(|| if fs::remove_dir(folder).is_err() { lock() } else { None }) else {
         drop(fs::remove_dir_all(folder));
@@ -126,7 +128,7 @@ fn sweep_one(folder: &Path, user: u32) {
     drop(fs::remove_dir_all(folder));
 }
 
-/// Locks a new workplace; none when another process removed it meanwhile.
+/// Locks a new workplace; `None` when another process removed it meanwhile.
 fn lock(folder: &Path) -> io::Result<Option<File>> {
     let path = folder.join(LOCK);
     let file = match File::create(&path) {
@@ -149,7 +151,7 @@ mod tests {
         fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
     }
 
-    /// What a kill leaves: the folder without anybody who holds its lock.
+    /// Leaves what a killed process leaves: the folder with a free lock.
     fn abandon(workplace: Workplace) -> PathBuf {
         let folder = workplace.folder.clone();
         let copy = folder.with_file_name("copy");

@@ -1,4 +1,4 @@
-// Registration, and how a marked dataset comes to be.
+// Registration and creation of a marked dataset.
 
 #include "shim.h"
 
@@ -86,8 +86,8 @@ static GDALDataset *Create(const char *name, int, int, int bands, GDALDataType, 
     }
 }
 
-// GDAL deletes what bears the name of a dataset before it creates it, and goes on when that fails. What is in
-// the way of a marked map is Create's to judge, so nothing is said here.
+// GDAL deletes the file of a dataset's name before it creates the dataset, and continues when that fails.
+// Create decides what is in the way of a marked map, so this function reports nothing.
 static CPLErr Delete(const char *name)
 {
     if (!HasPrefix(name))
@@ -104,7 +104,7 @@ static GDALDriver *NewDriver()
     driver->SetMetadataItem(GDAL_DMD_CONNECTION_PREFIX, MESHMARK_PREFIX);
     driver->SetMetadataItem(GDAL_DMD_OPENOPTIONLIST, meshmark_option_list());
     driver->SetMetadataItem(GDAL_DMD_CREATIONOPTIONLIST, meshmark_creation_option_list());
-    // What a format lacks of these its own driver says: see MeshmarkOutputDataset.
+    // The driver of the format reports what it lacks of these: see MeshmarkOutputDataset.
     driver->SetMetadataItem(GDAL_DMD_CREATIONFIELDDATATYPES,
                             "Integer Integer64 Real String Date DateTime Time Binary IntegerList Integer64List "
                             "RealList StringList");

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-// Between two looks at the source's files, so that a change is seen before a writer commits.
+// The interval between checks of the source's files, so that a change is detected before a writer commits.
 constexpr int FEATURES_BETWEEN_CHECKS = 256;
 // The metadata domain in which GDAL keeps members of a GeoJSON file.
 constexpr const char *NATIVE_DATA = "NATIVE_DATA";
@@ -67,7 +67,7 @@ OGRFeature *MeshmarkLayer::GetNextFeature()
     return nullptr;
 }
 
-// The next feature of the source, marked. After a failure there is none until the next reset.
+// Returns the next feature of the source, marked. After a failure there is none until the next reset.
 OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
 {
     if (m_ended)
@@ -95,7 +95,7 @@ OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
     return nullptr;
 }
 
-// As many features come out as were marked.
+// Checks that as many features are read as were marked.
 void MeshmarkLayer::CheckEnd() const
 {
     const bool is_filtered = !m_readsAll && (m_poFilterGeom || m_pszAttrQueryString);
@@ -204,7 +204,7 @@ void MeshmarkLayer::SetSpatialFilter(int field, OGRGeometry *geometry)
 }
 #endif
 
-// As hosts do: with a number, GDAL 3.10 complains of tables without geometry.
+// Hosts call it without a number: with one, GDAL 3.10 reports an error for tables without geometry.
 static void SetFilter(OGRLayer &source, int field, OGRGeometry *geometry)
 {
     if (field == 0)
@@ -358,7 +358,7 @@ OGRErr MeshmarkLayer::GetExtent(int field, OGREnvelope *extent, int force)
 }
 #endif
 
-// Of all features, whatever the filters, as most drivers do.
+// Returns the extent of all features, whatever the filters, as most drivers do.
 OGRErr MeshmarkLayer::Extent(int field, OGREnvelope *extent, bool force)
 {
     if (!m_marked)
@@ -375,7 +375,7 @@ OGRErr MeshmarkLayer::Extent(int field, OGREnvelope *extent, bool force)
     return extent->IsInit() ? OGRERR_NONE : OGRERR_FAILURE;
 }
 
-// Reads the whole layer: the source knows only where the vertices were.
+// Reads the whole layer, as the source has only the unmarked vertices.
 bool MeshmarkLayer::MeasureExtents()
 {
     const int fields = GetLayerDefn()->GetGeomFieldCount();

@@ -1,4 +1,4 @@
-// A dataset under construction: layers and fields as the real driver makes them, features to Rust.
+// A dataset under construction: layers and fields are those of the real driver, and features go to Rust.
 
 #include "shim.h"
 
@@ -11,7 +11,7 @@ static OGRErr AsError(bool success)
 
 // --- dataset -------------------------------------------------------------------------------------
 
-// The driver is that of the format: ogr2ogr asks it for field types and layer creation options.
+// Returns the driver of the format, which ogr2ogr asks for field types and layer creation options.
 MeshmarkOutputDataset::MeshmarkOutputDataset(GDALDataset *schema, MeshmarkWriter *writer)
     : m_schema(schema), m_writer(writer)
 {
@@ -68,7 +68,7 @@ MESHMARK_CONST OGRLayer *MeshmarkOutputDataset::GetLayer(int index) MESHMARK_CON
 
 int MeshmarkOutputDataset::TestCapability(const char *capability) MESHMARK_CONST
 {
-    // A layer that cannot be created must be heard of: ogr2ogr -skipfailures goes on without asking for it.
+    // A layer that cannot be created must be reported: ogr2ogr -skipfailures continues without a check.
     for (const char *ours : {ODsCCreateLayer, ODsCTransactions, ODsCRandomLayerWrite})
     {
         if (EQUAL(capability, ours))
@@ -122,7 +122,7 @@ OGRErr MeshmarkOutputDataset::CommitTransaction()
     return AsError(meshmark_writer_commit(Writer()));
 }
 
-// The failure that led to this stays GDAL's last one.
+// The failure that led to this remains GDAL's last one.
 OGRErr MeshmarkOutputDataset::RollbackTransaction()
 {
     meshmark_writer_roll_back(m_writer);

@@ -1,7 +1,7 @@
 // The driver's classes, and the border between C++ and Rust.
 //
-// GDAL's C API cannot make a driver, so a dataset and a layer are subclassed here. They hand every
-// call on to the source; what concerns the mark is asked of Rust.
+// GDAL's C API cannot make a driver, so a dataset and a layer are subclassed here. They pass every call to
+// the source; Rust answers what concerns the mark.
 
 #pragma once
 
@@ -34,10 +34,10 @@ constexpr const char *MESHMARK_DRIVER = "MESHMARK";
 // PREFIX of dataset/src/marked_view.rs is the same for Rust.
 constexpr const char *MESHMARK_PREFIX = "MESHMARK:";
 
-// --- from C++ to Rust (src/ffi.rs) ---------------------------------------------------------------
-// No function throws or unwinds. Those that can fail say so with exactly one CPLError.
+// --- from C++ to Rust (src/ffi.rs) --------------------------------------------------------------- No
+// function throws or unwinds. Those that can fail report it with exactly one CPLError.
 
-struct MeshmarkMarking; // what Rust knows of one marked dataset
+struct MeshmarkMarking; // the Rust side of one marked dataset
 
 extern "C"
 {
@@ -47,16 +47,17 @@ extern "C"
     MeshmarkMarking *meshmark_mark(GDALDatasetH source, CSLConstList options);
     void meshmark_free(MeshmarkMarking *);
 
-    // Whether the vertices of this layer move.
+    // Returns whether the vertices of this layer move.
     bool meshmark_marks_layer(const MeshmarkMarking *, const char *layer);
-    // Moves every coordinate of a geometry; how many there are, or -1 on failure.
+    // Moves every coordinate of a geometry and returns their number, or -1 on failure.
     int64_t meshmark_move(const MeshmarkMarking *, const char *layer, GIntBig fid, unsigned char *wkb, size_t size);
-    // The furthest any vertex moves along x and y, CRS units.
+    // Returns the furthest movement of any vertex along x and y, CRS units.
     void meshmark_reach(const MeshmarkMarking *, double *x, double *y);
-    // False and a failure when the source's files are no longer those that were marked.
+    // Returns false and reports a failure when the source's files are no longer those that were marked.
     bool meshmark_source_is_unchanged(const MeshmarkMarking *);
 
-    // False and a failure when layer number `number` has not given as many features as it had when it was marked.
+    // Returns false and reports a failure when layer number `number` has not yielded as many features as were
+    // marked.
     bool meshmark_is_complete(const MeshmarkMarking *, const char *layer, int number, uint64_t features);
 
     // Leaves places out of the native data of a feature; whether its foreign members hold some (src/ffi_native_data.rs).
@@ -65,41 +66,41 @@ extern "C"
     // The native data of a layer, without places; the caller frees it.
     char **meshmark_native_data(CSLConstList metadata);
 
-    // Whether writing to `name` would destroy the source of an open marked dataset.
+    // Returns whether writing to `name` would destroy the source of an open marked dataset.
     bool meshmark_is_being_read(const char *name);
-    // Says that it is being read, and first saves a copy if something may write to it all the same.
+    // Reports that it is being read, and first saves a copy if a writer may overwrite it all the same.
     void meshmark_refuse_to_write(const char *name, bool copy_first);
-    // The XML lists of open and creation options; they live as long as the process.
+    // Return the XML lists of open and creation options, which live as long as the process.
     const char *meshmark_option_list();
     const char *meshmark_creation_option_list();
 }
 
 // --- from C++ to Rust, while a host writes (src/ffi_writer.rs) -------------------------------------
 
-struct MeshmarkWriter; // what Rust knows of a dataset under construction
+struct MeshmarkWriter; // the Rust side of a dataset under construction
 
 extern "C"
 {
     // Begins the file `name`; nullptr on failure. *schema is an empty dataset of the real driver that lives as
     // long as the writer.
     MeshmarkWriter *meshmark_writer_new(const char *name, CSLConstList options, GDALDatasetH *schema);
-    // Creates a layer; the empty one of the real driver, nullptr on failure.
+    // Creates a layer and returns the empty one of the real driver, nullptr on failure.
     OGRLayerH meshmark_writer_add_layer(MeshmarkWriter *, const char *name, OGRSpatialReferenceH,
                                         OGRwkbGeometryType, CSLConstList options);
     bool meshmark_writer_add_field(MeshmarkWriter *, int layer, OGRFieldDefnH, bool approximate);
-    // Takes a feature and sets its id.
+    // Stages a feature and sets its id.
     bool meshmark_writer_write(MeshmarkWriter *, int layer, OGRFeatureH);
     void meshmark_writer_begin(MeshmarkWriter *);
-    // False when no transaction is open.
+    // Returns false when no transaction is open.
     bool meshmark_writer_commit(MeshmarkWriter *);
     void meshmark_writer_roll_back(MeshmarkWriter *);
-    // Marks and publishes, unless `host_failure` says that the host failed; frees the writer. Metadata and
-    // styles are those of `described`.
+    // Marks and publishes unless the host failed with `host_failure`; frees the writer. Metadata and styles
+    // are those of `described`.
     bool meshmark_writer_finish(MeshmarkWriter *, GDALDatasetH described, const char *host_failure);
 
-    // Says why a marked map is not opened for update.
+    // Reports why a marked map is not opened for update.
     void meshmark_writer_refuse_update(const char *name);
-    // Says that the name lacks the prefix.
+    // Reports that the name lacks the prefix.
     void meshmark_writer_refuse_bare(const char *name);
 }
 
@@ -202,9 +203,11 @@ class MeshmarkDataset final : public GDALDataset
     bool IsLayerPrivate(int index) const override { return m_source && m_source->IsLayerPrivate(index); }
     int TestCapability(const char *capability) MESHMARK_CONST override;
 
-    // Whether the source makes features of all layers in one pass over its file, so that only one can be read at a time.
+    // Whether the source creates features of all layers in one pass over its file, so that only one layer can
+    // be read at a time.
     bool ReadsInTurn() const { return m_readsInTurn; }
-    // Lets a layer be read from its start, or further; false and a failure when another one has been begun since.
+    // Makes a layer readable from its start, or further; returns false and reports a failure when another one
+    // has been begun since.
     bool GiveTurn(MeshmarkLayer &layer, bool starts);
     void EndTurn();
     void EndTurnOf(const MeshmarkLayer &layer);
@@ -231,8 +234,8 @@ class MeshmarkDataset final : public GDALDataset
     std::vector<std::unique_ptr<MeshmarkLayer>> m_layers;
 };
 
-// --- the write side ------------------------------------------------------------------------------
-// Hosts see what the real driver makes of layers and fields; features go to Rust.
+// --- the write side ------------------------------------------------------------------------------ Hosts see
+// the layers and fields of the real driver; features go to Rust.
 
 class MeshmarkOutputDataset;
 
@@ -294,7 +297,8 @@ class MeshmarkOutputDataset final : public GDALDataset
 #elif MESHMARK_GDAL_AT_LEAST(7)
     CPLErr Close() override;
 #endif
-    // For a call that writes. GDAL's last failure after it is one that came after it: Finish looks for that.
+    // Returns the writer for a call that writes. GDAL's last failure afterwards is a later one, which Finish
+    // examines.
     MeshmarkWriter *Writer();
 
   protected:

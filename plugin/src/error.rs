@@ -1,7 +1,7 @@
 use meshmark_dataset::decimals::Digits;
 use std::io::{self, ErrorKind};
 
-/// Why a map cannot be marked. Every message says what to do about it.
+/// The reasons why a map cannot be marked. Every message names the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     #[error("it is {0} already: name the dataset itself")]

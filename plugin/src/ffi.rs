@@ -1,5 +1,5 @@
-//! The border: what GDAL and hosts call in this library, and what the C++ shim calls in Rust.
-//! `cpp/shim.h` and `include/meshmark.h` declare these functions.
+//! The border: the functions of this library that GDAL, hosts and the C++ shim call. `cpp/shim.h` and
+//! `include/meshmark.h` declare these functions.
 
 use crate::{
     error::{Error, Result},
@@ -88,7 +88,7 @@ unsafe extern "C" fn meshmark_open(
     })
 }
 
-/// `ogr2ogr` does so of every driver.
+/// Returns whether the host asks for native data, as `ogr2ogr` does with every driver.
 fn asks_for_native_data(options: &[String]) -> bool {
     options.iter().any(|option| option.eq_ignore_ascii_case("NATIVE_DATA=YES"))
 }
@@ -219,8 +219,7 @@ fn request(options: &[String]) -> Result<MarkingRequest> {
     MarkingRequest::new(&split_options(options)?, default_key_path())
 }
 
-/// Marks the dataset, with GDAL's own messages collected instead of emitted: streaming will emit
-/// those that matter again.
+/// Marks the dataset and suppresses the messages of GDAL meanwhile: streaming emits those that matter again.
 pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
@@ -237,7 +236,7 @@ pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result
     Ok(marking)
 }
 
-/// Gives a marking to the shim, or says why there is none.
+/// Gives a marking to the shim, or reports why there is none.
 fn hand_over(name: &str, marking: Result<Marking>) -> *mut Marking {
     match marking {
         Ok(mut marking) => {
@@ -256,7 +255,7 @@ pub fn fail(name: &str, error: &Error) {
     report(CPLErr::CE_Failure, format!("{PREFIX}{name}: {error}"));
 }
 
-/// Emits its warnings.
+/// Emits the warnings of a marked view of this name.
 pub fn warn(name: &str, warnings: &[String]) {
     warnings.iter().for_each(|warning| report(CPLErr::CE_Warning, format!("{PREFIX}{name}: {warning}")));
 }

@@ -1,4 +1,5 @@
-//! GDAL's errors: ours go out once, those of what we call are collected, and panics become errors.
+//! GDAL's errors: this library emits one per failure, collects those of the functions that it calls, and
+//! turns panics into errors.
 
 use crate::error::{Error, Result};
 use gdal_sys::{CPLErr, CPLErrorNum, OGRErr};
@@ -25,8 +26,8 @@ fn emit(class: CPLErr::Type, number: CPLErrorNum, message: &str) {
     unsafe { gdal_sys::CPLError(class, number, c"%s".as_ptr(), message.as_ptr()) };
 }
 
-/// Runs `f`; a panic becomes one GDAL failure and `on_panic`. Every function that C++ calls goes
-/// through here, for unwinding into C++ would be undefined.
+/// Runs `f`; a panic becomes one GDAL failure and `on_panic`. Every function that C++ calls runs under this
+/// guard, as unwinding into C++ would be undefined.
 pub fn guarded<T>(on_panic: T, f: impl FnOnce() -> T) -> T {
     match panic::catch_unwind(AssertUnwindSafe(f)) {
         Ok(value) => value,
@@ -48,8 +49,8 @@ fn describe(payload: &(dyn Any + Send)) -> &str {
 
 static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
 
-/// Keeps panics off the standard error of the host; [`guarded`] reports them. This library has a
-/// standard library of its own, so the hook concerns nobody else.
+/// Keeps panics off the standard error of the host; [`guarded`] reports them. This library links a standard
+/// library of its own, so the hook affects no other code.
 pub fn silence_panics() {
     panic::set_hook(Box::new(|info| {
         let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line()));
@@ -61,7 +62,8 @@ fn take_panic_place() -> String {
     PANIC_PLACE.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
 }
 
-/// Catches the errors of the GDAL functions that are called while it lives, on this thread, which it cannot leave.
+/// Collects the errors of the GDAL functions that are called while it lives, on its own thread, which it
+/// cannot leave.
 pub struct Collector(Box<RefCell<Vec<Caught>>>, PhantomData<*const ()>);
 
 struct Caught {
@@ -82,18 +84,18 @@ impl Collector {
         Collector(caught, PhantomData)
     }
 
-    /// The first failure since the last [`Collector::clear`].
+    /// Returns the first failure since the last [`Collector::clear`].
     pub fn first_failure(&self) -> Option<String> {
         let caught = self.0.borrow();
         caught.iter().find(|e| e.class == CPLErr::CE_Failure).map(|e| e.message.clone())
     }
 
-    /// Forgets what was caught.
+    /// Discards the collected errors.
     pub fn clear(&self) {
         self.0.borrow_mut().clear();
     }
 
-    /// Ends collecting and emits what was caught, as if nobody had collected it.
+    /// Ends collecting and emits the collected errors.
     pub fn release(self) {
         let caught = self.0.take();
         drop(self);
@@ -113,19 +115,19 @@ impl Drop for Collector {
     }
 }
 
-/// Lets GDAL be silent on this thread, until [`unhush`].
+/// Silences GDAL on this thread until [`unhush`].
 pub fn hush() {
     // SAFETY: GDAL's own handler, which lives as long as GDAL does.
     unsafe { gdal_sys::CPLPushErrorHandler(Some(gdal_sys::CPLQuietErrorHandler)) };
 }
 
-/// Ends what [`hush`] began, on the same thread.
+/// Ends the silence that [`hush`] began on the same thread.
 pub fn unhush() {
     // SAFETY: pops the handler that `hush` pushed; without one, GDAL does nothing.
     unsafe { gdal_sys::CPLPopErrorHandler() };
 }
 
-/// Fails with what GDAL reported while `what` was tried, unless its answer is that there was no error.
+/// Fails with the error that GDAL reported during `what`, unless `error` is none.
 pub fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Collector) -> Result<()> {
     match error {
         OGRErr::OGRERR_NONE => Ok(()),
@@ -133,7 +135,7 @@ pub fn check(error: OGRErr::Type, what: impl FnOnce() -> String, collector: &Col
     }
 }
 
-/// The failure of `what`, with the reason that GDAL gave.
+/// Creates the failure of `what` with GDAL's reason.
 pub fn failure(what: String, collector: &Collector) -> Error {
     let reason = collector.first_failure().unwrap_or_else(|| "GDAL gives no reason".into());
     Error::Writing { what, reason }

@@ -12,63 +12,62 @@ use std::{
 };
 
 unsafe extern "C" {
-    /// A list field as a JSON array; the caller frees it.
+    /// Returns a list field as a JSON array; the caller frees it.
     fn meshmark_shim_list_as_json(feature: OGRFeatureH, field: c_int) -> *mut c_char;
 }
 
-/// A feature of somebody else.
+/// A feature that this library does not own.
 #[derive(Clone, Copy)]
 pub struct FeatureRef<'a>(OGRFeatureH, PhantomData<&'a ()>);
 
 impl FeatureRef<'_> {
-    /// # Safety
-    /// The feature stays while this lives.
+    /// # Safety The feature exists while this lives.
     pub unsafe fn new(feature: OGRFeatureH) -> Self {
         FeatureRef(feature, PhantomData)
     }
 
-    /// For GDAL, while this lives.
+    /// Returns the handle for GDAL, which is valid while this lives.
     pub fn handle(&self) -> OGRFeatureH {
         self.0
     }
 
-    /// Its id, when it has one.
+    /// Returns its id, when it has one.
     pub fn id(&self) -> Option<i64> {
         // SAFETY: the feature is there.
         Some(unsafe { gdal_sys::OGR_F_GetFID(self.0) }).filter(|&id| id != NULL_ID)
     }
 
-    /// Gives it the id under which it was written.
+    /// Sets the id under which it was written.
     pub fn set_id(&self, id: i64) {
         // SAFETY: the feature is there.
         unsafe { gdal_sys::OGR_F_SetFID(self.0, id) };
     }
 
-    /// How many fields it has.
+    /// Returns how many fields it has.
     pub fn field_count(&self) -> usize {
         // SAFETY: the feature is there.
         unsafe { gdal_sys::OGR_F_GetFieldCount(self.0) as usize }
     }
 
-    /// How it shall look, where that is said.
+    /// Returns its style, if it has one.
     pub fn style(&self) -> Option<String> {
         // SAFETY: the feature is there; the style is null or a C string.
         Some(unsafe { text(gdal_sys::OGR_F_GetStyleString(self.0)) }).filter(|style| !style.is_empty())
     }
 
-    /// Whether nothing was said of a field, which is less than null.
+    /// Returns whether a field is unset, which differs from null.
     pub fn is_unset(&self, field: usize) -> bool {
         // SAFETY: the feature is there, and the field is one of its own.
         unsafe { gdal_sys::OGR_F_IsFieldSet(self.0, field as c_int) == 0 }
     }
 
-    /// A number; zero when there is none.
+    /// Returns the number in a field; zero when there is none.
     pub fn real(&self, field: usize) -> f64 {
         // SAFETY: the feature is there, and GDAL checks the index.
         unsafe { gdal_sys::OGR_F_GetFieldAsDouble(self.0, field as c_int) }
     }
 
-    /// The bytes of a field's text, in whatever encoding.
+    /// Returns the bytes of a field's text, in any encoding.
     pub fn bytes(&self, field: usize) -> Vec<u8> {
         // SAFETY: the feature is there, GDAL checks the index, and the value is a C string that is copied.
         unsafe {
@@ -76,12 +75,12 @@ impl FeatureRef<'_> {
         }
     }
 
-    /// The bytes of a list as JSON; none when it is null or not set.
+    /// Returns the bytes of a list as JSON; none when it is null or unset.
     pub fn list(&self, field: usize) -> Vec<u8> {
         self.json(field).map(CString::into_bytes).unwrap_or_default()
     }
 
-    /// A list as JSON, in whatever encoding; none when it is null or not set.
+    /// Returns a list as JSON, in any encoding; `None` when it is null or unset.
     fn json(&self, field: usize) -> Option<CString> {
         // SAFETY: the feature is there, and GDAL checks the index; the text is ours to free.
         unsafe {
@@ -92,7 +91,7 @@ impl FeatureRef<'_> {
         }
     }
 
-    /// A text field's value; empty when it has none.
+    /// Returns the value of a text field; empty when it has none.
     pub fn text(&self, field: usize) -> String {
         // SAFETY: the feature is there, GDAL checks the index, and the value is a C string.
         unsafe { text(gdal_sys::OGR_F_GetFieldAsString(self.0, field as c_int)) }
@@ -102,7 +101,7 @@ impl FeatureRef<'_> {
 /// GDAL's id of a feature that has none.
 pub const NULL_ID: i64 = -1;
 
-/// A feature of our own.
+/// A feature that this library owns.
 pub struct Feature(OGRFeatureH);
 
 impl Feature {
@@ -112,13 +111,13 @@ impl Feature {
         Feature(feature)
     }
 
-    /// For reading.
+    /// Borrows the feature for reading.
     pub fn borrow(&self) -> FeatureRef<'_> {
         FeatureRef(self.0, PhantomData)
     }
 
-    /// Takes geometry and attributes of another feature; `map` has for each of its fields the number of the
-    /// field here, or none; those of `lists` become JSON.
+    /// Copies geometry and attributes of another feature. `map` holds for each field of the other feature the
+    /// number of the field here, or none; fields in `lists` become JSON.
     pub fn copy_from(&self, other: FeatureRef, map: &[Option<usize>], lists: &[usize]) -> Result<()> {
         if map.len() != other.field_count() {
             let reason = format!("it has {} fields, its layer {}", other.field_count(), map.len());
@@ -157,7 +156,7 @@ impl Feature {
         self.set_c_text(field, &c_string(value));
     }
 
-    /// Sets a field to a text in whatever encoding.
+    /// Sets a field to a text in any encoding.
     pub fn set_c_text(&self, field: usize, value: &CStr) {
         // SAFETY: the feature is ours, GDAL checks the index, and the text is copied.
         unsafe { gdal_sys::OGR_F_SetFieldString(self.0, field as c_int, value.as_ptr()) };
@@ -169,13 +168,13 @@ impl Feature {
         unsafe { gdal_sys::OGR_F_SetFieldDouble(self.0, field as c_int, value) };
     }
 
-    /// Says nothing of a field.
+    /// Unsets a field.
     pub fn unset(&self, field: usize) {
         // SAFETY: the feature is ours, and the field is one of its own.
         unsafe { gdal_sys::OGR_F_UnsetField(self.0, field as c_int) };
     }
 
-    /// For GDAL, while this lives.
+    /// Returns the handle for GDAL, which is valid while this lives.
     pub fn handle(&self) -> OGRFeatureH {
         self.0
     }

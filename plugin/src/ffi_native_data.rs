@@ -1,4 +1,5 @@
-//! GDAL's native data, the words of a GeoJSON file: handed on without what they say of unmarked places.
+//! GDAL's native data, the members of a GeoJSON file beyond GDAL's own model: they are passed on without
+//! unmarked positions.
 
 use crate::{
     ffi_errors::{guarded, report},
@@ -15,10 +16,12 @@ use std::{
     ptr,
 };
 
-/// The metadata domain of a layer, and the name of the item and of the layer creation option that hold the words.
+/// The metadata domain of a layer, and the name of the item and of the layer creation option that hold native
+/// data.
 pub const NATIVE_DATA: &str = "NATIVE_DATA";
 
-/// A NAME=VALUE pair of a layer's native data, without places; none when nothing is left.
+/// Returns the value of a NAME=VALUE pair of a layer's native data without positions; `None` when nothing is
+/// left.
 pub fn item_without_places(name: &str, value: &str) -> Option<String> {
     if !name.eq_ignore_ascii_case(NATIVE_DATA) {
         return Some(value.into());
@@ -46,7 +49,7 @@ impl FeatureRef<'_> {
 }
 
 impl Feature {
-    /// Gives it native data.
+    /// Sets its native data.
     pub fn set_native_data(&self, data: &CStr) {
         // SAFETY: the feature is ours, and both texts are copied.
         unsafe {
@@ -76,7 +79,7 @@ unsafe extern "C" fn meshmark_warn_of_foreign_places(layer: *const c_char) {
     guarded((), || report(CPLErr::CE_Warning, foreign_places(&unsafe { text(layer) })));
 }
 
-/// The native data of a layer, as a list of metadata, without places; the caller frees it.
+/// Returns the native data of a layer, as a list of metadata, without positions; the caller frees it.
 ///
 /// # Safety
 /// `metadata` is null or an array of C strings that ends in null.

@@ -1,4 +1,4 @@
-//! Datasets that are written, by GDAL's C API: layers, fields, features, and what describes them.
+//! Datasets that are written by GDAL's C API: layers, fields, features, and their metadata and styles.
 
 use crate::{
     error::Result,
@@ -18,14 +18,14 @@ use std::{
     ptr,
 };
 
-/// The configuration option for checking creation options.
+/// The configuration option that controls the check of creation options.
 const VALIDATE: &CStr = c"GDAL_VALIDATE_CREATION_OPTIONS";
 
-/// What a layer is created with.
+/// The specification of a layer.
 pub struct LayerSpec {
     /// Its name.
     pub name: String,
-    /// Of its geometry column.
+    /// The type of its geometry column.
     pub geometry: OGRwkbGeometryType::Type,
     /// Layer creation options.
     pub options: Vec<(String, String)>,
@@ -50,9 +50,9 @@ impl LayerSpec {
         LayerSpec { name, geometry, options, srs }
     }
 
-    /// Whether x and y are longitudes and latitudes of WGS 84, or nobody knows.
+    /// Returns whether x and y are longitudes and latitudes of WGS 84, or of an unknown CRS.
     pub fn is_wgs84(&self) -> bool {
-        // The order of the axes is that of the host's coordinates in any case: x is the longitude.
+        // The order of the axes does not matter, as x is the longitude in the host's coordinates.
         let criterion = c"CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS";
         let axes = c"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES";
         let options = [criterion.as_ptr(), axes.as_ptr(), ptr::null()];
@@ -71,7 +71,7 @@ impl LayerSpec {
         }
     }
 
-    /// The same layer with another name and other options.
+    /// Returns the same layer with another name and other options.
     pub fn renamed(&self, name: String, options: Vec<(String, String)>) -> Self {
         // SAFETY: the spatial reference is null or ours.
         unsafe { Self::new(name, self.srs.0, self.geometry, options) }
@@ -89,12 +89,12 @@ impl Drop for Srs {
     }
 }
 
-/// What a field is created with.
+/// The specification of a field.
 #[derive(Clone)]
 pub struct Field {
-    /// Its name; what is not UTF-8 is replaced.
+    /// Its name; bytes that are not UTF-8 are replaced.
     pub name: String,
-    /// The bytes of its name, in whatever encoding.
+    /// The bytes of its name, in any encoding.
     c_name: CString,
     /// Its type.
     pub kind: OGRFieldType::Type,
@@ -109,7 +109,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// A text field.
+    /// Returns a text field.
     pub fn text(name: String) -> Self {
         Field {
             c_name: c_string(&name),
@@ -148,8 +148,8 @@ impl Field {
         }
     }
 
-    /// The field of a staging GeoPackage that keeps every value of this one: what GeoPackage would change
-    /// becomes text. Constraints are the target's to check.
+    /// Returns the field of a staging GeoPackage that keeps every value of this one: types that GeoPackage
+    /// would change become text. The target checks constraints.
     pub fn staged(&self, name: String, is_geopackage: bool) -> Self {
         let kept = match self.kind {
             OGRFieldType::OFTInteger
@@ -172,17 +172,17 @@ impl Field {
         }
     }
 
-    /// Whether it holds a number with fractions.
+    /// Returns whether it holds a number with fractions.
     pub fn is_real(&self) -> bool {
         self.kind == OGRFieldType::OFTReal
     }
 
-    /// Whether it holds a text.
+    /// Returns whether it holds a text.
     pub fn is_text(&self) -> bool {
         self.kind == OGRFieldType::OFTString
     }
 
-    /// Whether it holds several values.
+    /// Returns whether it holds several values.
     pub fn is_list(&self) -> bool {
         matches!(
             self.kind,
@@ -251,12 +251,12 @@ impl Output {
         }
     }
 
-    /// The dataset, which lives as long as this.
+    /// Returns the dataset, which lives as long as this.
     pub fn handle(&self) -> GDALDatasetH {
         self.dataset
     }
 
-    /// A layer, which lives as long as this.
+    /// Returns a layer, which lives as long as this.
     pub fn layer(&self, number: usize) -> OGRLayerH {
         self.layers[number]
     }
@@ -269,7 +269,7 @@ impl Output {
         check(error, || "starting a transaction".into(), &collector)
     }
 
-    /// Commits it.
+    /// Commits that transaction.
     pub fn commit(&self) -> Result<()> {
         let collector = Collector::new();
         // SAFETY: the dataset is open.
@@ -277,7 +277,7 @@ impl Output {
         check(error, || "committing".into(), &collector)
     }
 
-    /// Creates a layer. What the driver has to say is emitted unless `quiet`.
+    /// Creates a layer. The messages of the driver are emitted unless `quiet`.
     pub fn add_layer(&mut self, spec: &LayerSpec, quiet: bool) -> Result<()> {
         let name = c_string(&spec.name);
         let options: Vec<CString> = spec.options.iter().map(|(n, v)| c_string(&format!("{n}={v}"))).collect();
@@ -311,7 +311,7 @@ impl Output {
         Ok(())
     }
 
-    /// The fields of a layer.
+    /// Returns the fields of a layer.
     pub fn fields(&self, layer: usize) -> Vec<Field> {
         // SAFETY: the definition lives as long as the layer, and the indices are those of its fields.
         unsafe {
@@ -321,13 +321,13 @@ impl Output {
         }
     }
 
-    /// How many fields a layer has.
+    /// Returns how many fields a layer has.
     pub fn field_count(&self, layer: usize) -> usize {
         // SAFETY: the definition lives as long as the layer.
         unsafe { gdal_sys::OGR_FD_GetFieldCount(gdal_sys::OGR_L_GetLayerDefn(self.layers[layer])) as usize }
     }
 
-    /// The name of a layer, and of its columns for ids and geometries; empty where there is none.
+    /// Returns the name of a layer and of its columns for ids and geometries; empty where there is none.
     pub fn names(&self, layer: usize) -> [String; 3] {
         // SAFETY: the layer is open and the names are C strings.
         unsafe {
@@ -354,7 +354,7 @@ impl Output {
         Ok(())
     }
 
-    /// A new feature of a layer.
+    /// Returns a new feature of a layer.
     pub fn feature(&self, layer: usize) -> Feature {
         // SAFETY: the definition outlives the feature: GDAL counts references to it.
         unsafe {
@@ -362,7 +362,7 @@ impl Output {
         }
     }
 
-    /// Writes a feature; its id.
+    /// Writes a feature and returns its id.
     pub fn write(&self, layer: usize, feature: &Feature, quiet: bool) -> Result<i64> {
         let collector = Collector::new();
         // SAFETY: the layer and the feature are open.
@@ -375,7 +375,7 @@ impl Output {
         Ok(unsafe { gdal_sys::OGR_F_GetFID(feature.handle()) })
     }
 
-    /// Takes the field domains of another dataset.
+    /// Copies the field domains of another dataset.
     pub fn copy_domains(&self, from: &Output) {
         // SAFETY: both datasets are open; the list and the reason are ours to free.
         unsafe {
@@ -392,7 +392,7 @@ impl Output {
         }
     }
 
-    /// Takes metadata and styles of the dataset that a host described.
+    /// Copies metadata and styles of the dataset that a host described.
     pub fn describe(&self, described: &Described) {
         // SAFETY: both datasets are open, and the style table is copied.
         unsafe {
@@ -404,7 +404,7 @@ impl Output {
         }
     }
 
-    /// The same for a layer.
+    /// Copies metadata and styles of a layer that a host described.
     pub fn describe_layer(&self, layer: usize, described: &Described) {
         // SAFETY: GDAL checks the index; both layers are open, and the style table is copied.
         unsafe {
@@ -420,7 +420,7 @@ impl Output {
         }
     }
 
-    /// Closes the dataset; many drivers write only now.
+    /// Closes the dataset; many drivers write only at this point.
     pub fn close(self) -> Result<()> {
         let collector = Collector::new();
         let dataset = ManuallyDrop::new(self).dataset;
@@ -433,7 +433,7 @@ impl Output {
     }
 }
 
-/// Gives it up: what its driver has to say about that concerns nobody.
+/// Abandons the dataset; messages of its driver about this are discarded.
 impl Drop for Output {
     fn drop(&mut self) {
         let _quiet = Collector::new();
@@ -442,7 +442,7 @@ impl Drop for Output {
     }
 }
 
-/// But for the unmarked extent that a GeoJSON file has in its words.
+/// Copies metadata without the unmarked extent in the native data of a GeoJSON file.
 ///
 /// # Safety
 /// Both are datasets or layers that are open.

@@ -1,4 +1,4 @@
-//! The source dataset, by GDAL's C API: opening, filters, ignored fields, file list.
+//! The source dataset, read by GDAL's C API: opening, filters, ignored fields, file list.
 
 use crate::{
     error::{Error, Result},
@@ -21,18 +21,18 @@ use std::{
 };
 
 unsafe extern "C" {
-    /// A marked dataset that takes over a reference to `source`, and `marking`.
+    /// Returns a marked dataset that takes over a reference to `source`, and `marking`.
     fn meshmark_shim_view(source: GDALDatasetH, marking: *mut c_void) -> GDALDatasetH;
 }
 
 const DRIVER: &CStr = c"MESHMARK";
 
-/// A dataset handle that holds one reference and gives it up when dropped.
+/// A dataset handle that holds one reference and releases it when dropped.
 pub struct OwnedSource(GDALDatasetH);
 
 impl OwnedSource {
-    /// Opens a vector dataset to read, with the words of a GeoJSON file when `with_native_data`. What GDAL says
-    /// meanwhile is emitted only when it succeeds.
+    /// Opens a vector dataset to read, with the native data of a GeoJSON file if `with_native_data`. Messages
+    /// of GDAL are emitted only when it succeeds.
     pub fn open(name: &str, with_native_data: bool) -> Result<Self> {
         if name.trim().is_empty() {
             return Err(Error::NoSource);
@@ -42,7 +42,8 @@ impl OwnedSource {
         }
         let c_name = CString::new(name).expect("it was a C string");
         let collector = Collector::new();
-        // Internal: the handle is ours alone, and is not to be listed among the host's datasets.
+        // Internal means that the handle belongs to this library alone and is not listed among the host's
+        // datasets.
         let flags = GdalOpenFlags::GDAL_OF_VECTOR
             | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR
             | GdalOpenFlags::GDAL_OF_INTERNAL;
@@ -66,12 +67,12 @@ impl OwnedSource {
         Ok(OwnedSource(handle))
     }
 
-    /// The handle, whose reference now is the caller's.
+    /// Returns the handle, whose reference then belongs to the caller.
     pub fn into_handle(self) -> GDALDatasetH {
         ManuallyDrop::new(self).0
     }
 
-    /// The dataset, which lives as long as this.
+    /// Returns the dataset, which lives as long as this.
     pub fn dataset(&self) -> Borrowed<'_> {
         // SAFETY: the handle is open, and the borrow of `self` keeps its reference from being given up.
         unsafe { Borrowed::new(self.0) }
@@ -108,7 +109,7 @@ impl View {
         unsafe { &*self.marking }
     }
 
-    /// The marked dataset, which lives as long as this.
+    /// Returns the marked dataset, which lives as long as this.
     pub fn dataset(&self) -> Borrowed<'_> {
         // SAFETY: the handle is open, and the borrow of `self` keeps the view from closing it.
         unsafe { Borrowed::new(self.handle) }
@@ -146,7 +147,7 @@ impl Drop for View {
     }
 }
 
-/// Whether only raster drivers know the dataset: a damaged GeoPackage could be both.
+/// Returns whether only raster drivers recognise the dataset: a damaged GeoPackage could be both.
 fn is_raster(name: &CStr) -> bool {
     let known = |kind: GdalOpenFlags| {
         // SAFETY: the name is a C string; null lists mean all drivers and no sibling files.
@@ -157,7 +158,8 @@ fn is_raster(name: &CStr) -> bool {
     known(GdalOpenFlags::GDAL_OF_RASTER) && !known(GdalOpenFlags::GDAL_OF_VECTOR)
 }
 
-/// A dataset of somebody else, open for `'a`, for the `gdal` crate: it is not closed here.
+/// A dataset that this library does not own, open for `'a`, in the type of the `gdal` crate: dropping it does
+/// not close it.
 pub struct Borrowed<'a>(ManuallyDrop<Dataset>, PhantomData<&'a Dataset>);
 
 impl Borrowed<'_> {
@@ -176,14 +178,14 @@ impl Borrowed<'_> {
         }
     }
 
-    /// The name to call it by in messages.
+    /// Returns its name for messages.
     pub fn name(&self) -> String {
         // SAFETY: the dataset is open, and its description is a C string.
         let name = unsafe { text(gdal_sys::GDALGetDescription(self.c_dataset())) };
         if name.is_empty() { "the dataset".into() } else { name }
     }
 
-    /// Watches the files it is read from.
+    /// Watches the files from which it is read.
     pub fn watch_files(&self) -> SourceFiles {
         // SAFETY: the dataset is open; the list is ours to free.
         unsafe {
@@ -194,7 +196,7 @@ impl Borrowed<'_> {
         }
     }
 
-    /// Clears all filters, and leaves attributes unread until the result is dropped.
+    /// Clears all filters and makes layers yield no attributes until the result is dropped.
     pub fn read_geometry_only(&self) -> GeometryOnly<'_> {
         let layers = self.layers();
         for &layer in &layers {
@@ -254,7 +256,7 @@ unsafe fn ignore_attributes(layer: OGRLayerH) {
         let definition = gdal_sys::OGR_L_GetLayerDefn(layer);
         let fields = 0..gdal_sys::OGR_FD_GetFieldCount(definition);
         let name = |i| gdal_sys::OGR_Fld_GetNameRef(gdal_sys::OGR_FD_GetFieldDefn(definition, i));
-        // To GDAL this name is that of the geometry, whatever fields there are.
+        // GDAL takes this name for the geometry, whatever the fields.
         let is_field =
             |name: &*const c_char| !CStr::from_ptr(*name).to_bytes().eq_ignore_ascii_case(b"OGR_GEOMETRY");
         let mut names: Vec<*const c_char> = fields.map(name).filter(is_field).collect();

@@ -1,8 +1,8 @@
-//! Texts from and for GDAL's C API.
+//! Conversions of texts for GDAL's C API.
 
 use std::ffi::{CStr, CString, c_char};
 
-/// The strings of a GDAL list.
+/// Returns the strings of a GDAL list.
 ///
 /// # Safety
 /// `list` is null or an array of C strings that ends in null.
@@ -14,7 +14,7 @@ pub unsafe fn strings(list: *const *const c_char) -> Vec<String> {
     unsafe { (0..).map(|i| *list.add(i)).take_while(|s| !s.is_null()).map(|s| text(s)).collect() }
 }
 
-/// A C string's text; empty for null.
+/// Returns the text of a C string; empty for null.
 ///
 /// # Safety
 /// `string` is null or a C string.
@@ -26,7 +26,7 @@ pub unsafe fn text(string: *const c_char) -> String {
     unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned()
 }
 
-/// A text that was a C string once.
+/// Converts a text that came from a C string.
 pub fn c_string(text: &str) -> CString {
     CString::new(text).expect("it was a C string")
 }

@@ -1,4 +1,5 @@
-//! The border of the write side: what the C++ shim calls while a host writes. `cpp/shim.h` declares it.
+//! The border of the write side: the functions that the C++ shim calls while a host writes. `cpp/shim.h`
+//! declares them.
 
 use crate::{
     error::{Error, Result},
@@ -27,10 +28,12 @@ use std::{
 
 type OptionList = *const *const c_char;
 
-/// The target that a host last wanted to open for update: what it does next is no creation of a new file.
+/// The target that a host last tried to open for update: if the host then creates it, it does not intend a
+/// new file.
 static EXTENDED: Mutex<Option<String>> = Mutex::new(None);
 
-/// Begins a dataset; stores in `schema` the empty one of the real driver, which lives as long as the writer.
+/// Begins a dataset and stores in `schema` the empty one of the real driver, which lives as long as the
+/// writer.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_new(
     name: *const c_char,
@@ -69,7 +72,7 @@ fn new_writer(name: &str, options: &[String]) -> Result<Writer> {
     Writer::new(Target::new(name, &creation)?, request)
 }
 
-/// A host wants to open a target for update, which cannot be.
+/// Refuses to open a target for update.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_refuse_update(name: *const c_char) {
     guarded((), || {
@@ -80,7 +83,7 @@ unsafe extern "C" fn meshmark_writer_refuse_update(name: *const c_char) {
     });
 }
 
-/// Somebody creates a dataset without the prefix.
+/// Refuses to create a dataset without the prefix.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_refuse_bare(name: *const c_char) {
     // SAFETY: the shim gives a C string.
@@ -89,7 +92,7 @@ unsafe extern "C" fn meshmark_writer_refuse_bare(name: *const c_char) {
     });
 }
 
-/// Creates a layer; the empty one of the real driver, or null.
+/// Creates a layer and returns the empty one of the real driver, or null.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_add_layer(
     writer: *mut Writer,
@@ -131,7 +134,7 @@ unsafe extern "C" fn meshmark_writer_add_field(
     })
 }
 
-/// Stages a feature, and sets its id.
+/// Stages a feature and sets its id.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_write(writer: *mut Writer, layer: c_int, feature: OGRFeatureH) -> bool {
     guarded(false, || {
@@ -160,7 +163,8 @@ unsafe extern "C" fn meshmark_writer_roll_back(writer: *mut Writer) {
     guarded((), || unsafe { (*writer).roll_back() });
 }
 
-/// Marks and publishes what `described` was given, unless something failed; frees the writer.
+/// Marks and publishes the dataset unless an operation failed, with metadata and styles of `described`; frees
+/// the writer.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_finish(
     writer: *mut Writer,

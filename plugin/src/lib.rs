@@ -1,4 +1,4 @@
-//! The GDAL driver: `MESHMARK:<any vector dataset>` is that dataset with marked geometry.
+//! The GDAL driver: `MESHMARK:<any vector dataset>` opens that dataset with marked geometry.
 //!
 //! ```text
 //! GDAL ── RegisterOGRMESHMARK, MeshmarkFilter ──> ffi ──> cpp/ (GDALDataset and OGRLayer, subclassed)
@@ -8,10 +8,11 @@
 //!                             dataset::survey, core::embedding
 //! ```
 //!
-//! Writing stages what a host writes, and marks it when the host closes the dataset: [`writer`] has the picture.
+//! Writing stages the features of a host and marks them when the host closes the dataset: `writer.rs` shows
+//! the data flow.
 //!
-//! Opening computes the mark: the vertex table and its new coordinates are all that is held in
-//! memory. Features stream through the C++ layer, which hands each geometry to [`marking`] as WKB.
+//! Opening computes the mark; only the vertex table and its new coordinates stay in memory. Features stream
+//! through the C++ layer, which passes each geometry to `marking.rs` as WKB.
 #![deny(unsafe_op_in_unsafe_fn)]
 #![warn(missing_docs)]
 

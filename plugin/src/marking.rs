@@ -1,4 +1,4 @@
-//! A marked dataset: options → survey → embedding → record, and then one geometry after the other.
+//! A marked dataset: options → survey → embedding → record, and then geometries one by one.
 
 use crate::{
     error::{Error, Result},
@@ -21,13 +21,13 @@ use meshmark_dataset::{
 };
 use std::{fs::File, path::Path};
 
-/// What GDAL adds to the open options of any driver.
+/// Options that GDAL adds to the open options of any driver.
 const HINTS_OF_GDAL: [&str; 3] = ["NATIVE_DATA", "VALIDATE_OPEN_OPTIONS", "NOLOCK"];
 
 /// Splits NAME=VALUE texts.
 pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
     let split = |text: &String| match text.split_once('=') {
-        // Bytes that are no text have become this character on their way here.
+        // The conversion to text replaces bytes that are not UTF-8 by this character.
         Some((name, value)) if value.contains(char::REPLACEMENT_CHARACTER) => {
             Err(Error::NotUtf8(format!("the value of option {name}")))
         }
@@ -37,7 +37,7 @@ pub fn split_options(texts: &[String]) -> Result<Vec<(String, String)>> {
     texts.iter().map(split).collect()
 }
 
-/// The options of one marking, checked as far as that is possible without the map.
+/// The options of one marking, checked as far as possible without the map.
 pub struct MarkingRequest {
     options: Options,
     subject: Subject,
@@ -46,7 +46,7 @@ pub struct MarkingRequest {
 }
 
 impl MarkingRequest {
-    /// Parses the options and reads the key file. `default_key_path` serves when no KEY is given.
+    /// Parses the options and reads the key file, by default that of `default_key_path`.
     pub fn new(pairs: &[(String, String)], default_key_path: Option<String>) -> Result<Self> {
         let ours =
             pairs.iter().filter(|(name, _)| !HINTS_OF_GDAL.iter().any(|h| h.eq_ignore_ascii_case(name)));
@@ -64,7 +64,8 @@ impl MarkingRequest {
         Ok(MarkingRequest { options, subject, key, key_path })
     }
 
-    /// Makes it choose layers by the names they have where they are staged; those that have none are left to be found missing.
+    /// Renames the chosen layers to the names under which they are staged; layers without such a name stay
+    /// and are later reported as missing.
     pub fn rename_layers<'a>(&mut self, staged: impl Fn(&str) -> Option<&'a str>) {
         for name in self.options.layers.iter_mut().flatten() {
             if let Some(staged) = staged(name) {
@@ -73,19 +74,19 @@ impl MarkingRequest {
         }
     }
 
-    /// Where the record shall go.
+    /// Returns the path of the record.
     pub fn record_path(&self) -> Option<&Path> {
         self.options.record_path.as_deref().map(Path::new)
     }
 
-    /// Where the key came from.
+    /// Returns the path of the key file.
     pub fn key_path(&self) -> &Path {
         Path::new(&self.key_path)
     }
 }
 
 fn pool(threads: usize) -> Result<ThreadPool> {
-    // GEOS says what it does not like about invalid geometries, on the thread that asks it.
+    // GEOS reports the faults of invalid geometries on the calling thread.
     let pool = ThreadPool::new(threads, ffi_errors::hush, ffi_errors::unhush);
     pool.map_err(|error| Error::Threads(error.to_string()))
 }
@@ -96,34 +97,34 @@ fn read_key(path: &str) -> Result<SecretKey> {
     SecretKey::from_json(&text).map_err(|source| Error::KeyMalformed { path: path.into(), source })
 }
 
-/// The source's side of a marking.
+/// The source of a marking.
 pub struct Source<'a> {
-    /// What to call it in messages.
+    /// Its name for messages.
     pub name: String,
     /// The dataset, without filters.
     pub dataset: &'a Dataset,
-    /// The files it is made of, as they were before it was read.
+    /// Its files in their state before it was read.
     pub files: SourceFiles,
-    /// What [`Selection::last_failure`] wants.
+    /// The function for [`Selection::last_failure`].
     pub last_failure: &'a dyn Fn() -> Option<String>,
 }
 
 /// A marked dataset.
 pub struct Marking {
-    /// What to call the source in messages.
+    /// The name of the source for messages.
     pub name: String,
     map: Survey,
     moved: Vec<[f64; 2]>,
     layers: Option<Vec<String>>,
     files: SourceFiles,
-    /// The text of its record, if somebody wants it.
+    /// The text of its record, if one is wanted.
     pub record: Option<String>,
-    /// Sentences the user should read though nothing failed.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
 impl Marking {
-    /// Surveys the source, and computes every vertex's new place on `threads` threads.
+    /// Surveys the source and computes the new place of every vertex on `threads` threads.
     pub fn new(request: &MarkingRequest, source: Source, threads: usize) -> Result<Self> {
         let options = &request.options;
         check_record_is_no_source(options, &source.files)?;
@@ -158,19 +159,20 @@ impl Marking {
         })
     }
 
-    /// Writes the record where the request wants it.
+    /// Writes the record to the path of the request.
     pub fn write_record(&self, request: &MarkingRequest) -> Result<()> {
         let wanted = request.record_path().zip(self.record.as_deref());
         wanted.map_or(Ok(()), |(path, text)| record_file::write(path, text))
     }
 
-    /// Fails unless the message can be demodulated from where the vertices were found: their new places as
-    /// somebody read them, in canonical order.
+    /// Fails unless the message can be demodulated from the places `found` of the vertices, which are their
+    /// new places as read back, in canonical order.
     ///
-    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are no erasures for
-    /// [`demodulation::joint`] to leave out, and the noise that it would weigh, the rounding to the digits of the
-    /// format, has no estimate here. [`embedding`] knows the noise of its own grid and uses `joint`. The two checks
-    /// stay different because either demodulator refuses other outputs than the other one.
+    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are no erasures
+    /// for [`demodulation::joint`] to leave out, and the noise that it would weigh, the rounding to the
+    /// digits of the format, has no estimate here. [`embedding`] has an estimate of its own noise and uses
+    /// `joint`. The two checks stay different, as a change of the demodulator would change which outputs are
+    /// refused.
     pub fn check_message(
         &self,
         request: &MarkingRequest,
@@ -194,22 +196,22 @@ impl Marking {
         }
     }
 
-    /// The new places of the vertices, in canonical order, CRS units.
+    /// Returns the new places of the vertices, in canonical order, CRS units.
     pub fn moved(&self) -> &[[f64; 2]] {
         &self.moved
     }
 
-    /// Whether the vertices of this layer move.
+    /// Returns whether the vertices of this layer move.
     pub fn marks_layer(&self, name: &str) -> bool {
         self.layers.as_ref().is_none_or(|layers| layers.iter().any(|layer| layer == name))
     }
 
-    /// Where the vertices go.
+    /// Returns the movement of the vertices.
     pub fn moves(&self) -> Moves<'_> {
         Moves { from: &self.map.data.vertices, to: &self.moved }
     }
 
-    /// The furthest any vertex moved along x and y, CRS units.
+    /// Returns the furthest movement of any vertex along x and y, CRS units.
     pub fn reach(&self) -> [f64; 2] {
         let moves = self.map.data.vertices.coords().iter().zip(&self.moved);
         moves.fold([0.0; 2], |reach: [f64; 2], (from, to)| {
@@ -217,7 +219,7 @@ impl Marking {
         })
     }
 
-    /// Fails when a layer that was read to its end has given another number of features than were marked.
+    /// Fails when a layer that was read to its end yielded another number of features than were marked.
     pub fn check_count(&self, layer: String, number: usize, came: u64) -> Result<()> {
         match self.map.features.get(&number) {
             Some(&marked) if marked != came => Err(Error::OtherCount { layer, marked, came }),

@@ -1,9 +1,9 @@
-//! What ogr2ogr was told to write to, read from its command line.
+//! The target of ogr2ogr, read from its command line.
 //!
 //! Writers of several files, like that of Shapefiles, append to the files of a folder without asking the
-//! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the
-//! source itself, so this is refused before anything is written; and so is a record in the place of the
-//! output, which one of the two would not survive. Other hosts are not looked at.
+//! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the source
+//! itself, so this is refused before anything is written. A record in the place of the output is refused too,
+//! as one would overwrite the other. Other hosts are not examined.
 
 use crate::{
     error::{Error, Result},
@@ -35,8 +35,8 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// The target of ogr2ogr, if it is one that is asked for. It stands before the source; between and before them
-/// stand options and their values.
+/// Returns the target of ogr2ogr, if `is_asked_for` accepts it. The target precedes the source; options and
+/// their values stand before and between them.
 fn target(arguments: &[String], is_asked_for: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
     if Path::new(program).file_name()? != "ogr2ogr" {

@@ -1,4 +1,5 @@
-//! Reading back: what is in the file is what was meant, and the message can be demodulated from its vertices.
+//! Reading back: this module checks that a written file holds what was meant, and that the message can be
+//! demodulated from its vertices.
 
 use crate::{
     error::{Error, Result},
@@ -45,7 +46,7 @@ pub fn check(written: &Written, view: &View, request: &MarkingRequest, threads: 
         let collector = Collector::new();
         let last_failure = || collector.first_failure();
         let comparison = ReadBack { digits, place: &Some, last_failure: &last_failure };
-        // The only layer of a file may bear the file's name.
+        // The only layer of a file may have the name of the file.
         let in_file = match written.format.many_layers {
             true => file.layer_by_name(&layer.name),
             false => file.layer(0),

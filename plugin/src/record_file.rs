@@ -1,4 +1,4 @@
-//! The record as a file: written whole or not at all, and never over another.
+//! The record as a file, which is written whole or not at all, and never over another one.
 
 use crate::error::{Error, Result};
 use meshmark_dataset::workplace::folder_of;
@@ -9,7 +9,7 @@ use std::{
     path::Path,
 };
 
-/// Whether a record could be written there, so that nobody waits for a mark first.
+/// Checks, before the mark is computed, that a record can be written to this path.
 pub fn check_folder(path: &Path) -> Result<()> {
     let reason = match folder_of(path) {
         folder if !folder.is_dir() => format!("{} is no folder", folder.display()),
@@ -19,8 +19,7 @@ pub fn check_folder(path: &Path) -> Result<()> {
     Err(Error::RecordUnwritable { path: path.display().to_string(), reason })
 }
 
-/// Writes the record. One that is there already with the same content is as good: hosts open a map
-/// more than once.
+/// Writes the record. An existing file with the same content is accepted, as hosts open a map more than once.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     let unwritable =
         |e: io::Error| Error::RecordUnwritable { path: path.display().to_string(), reason: e.to_string() };
@@ -44,7 +43,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
     }
 }
 
-/// Whether the file is there with just this content; an error when it has another.
+/// Returns whether the file exists with exactly this content; fails when it has another content.
 fn is_same(path: &Path, text: &str) -> Result<bool> {
     match fs::read(path) {
         Ok(bytes) if bytes == text.as_bytes() => Ok(true),

@@ -1,9 +1,9 @@
-//! The files a marked dataset is read from: nobody may write to them meanwhile.
+//! The files from which a marked dataset is read, which nobody may overwrite meanwhile.
 //!
-//! `ogr2ogr map.gpkg MESHMARK:map.gpkg` must not cost anybody their map. Before a writer of GDAL makes
-//! a file it deletes what bears its name, and before it appends it opens that for update; the driver
-//! sees both and refuses them ([`is_being_read`]). Most writers then give up. Some truncate the file
-//! all the same: for them it is copied first ([`save_copies`]).
+//! `ogr2ogr map.gpkg MESHMARK:map.gpkg` must not destroy the map. Before a writer of GDAL makes a file, it
+//! deletes the file of that name, and before it appends, it opens that file for update; the driver receives
+//! both calls and refuses them ([`is_being_read`]). Most writers then fail. Some truncate the file all the
+//! same: for them it is copied first ([`save_copies`]).
 
 use crate::error::{Error, Result};
 use meshmark_dataset::{FileId, same_file, workplace::folder_of};
@@ -25,7 +25,7 @@ static NEXT_NUMBER: AtomicU64 = AtomicU64::new(0);
 struct OpenSource {
     number: u64,
     files: Vec<(PathBuf, FileId)>,
-    /// The folders of a dataset of several files: GDAL can open the folder in its place.
+    /// The folders of a dataset of several files: GDAL can open the folder instead.
     folders: Vec<FileId>,
     copies: Vec<PathBuf>,
 }
@@ -42,7 +42,7 @@ struct Watched {
     sidecars: [u64; 2],
 }
 
-/// Another state is another content.
+/// The state of a file. Another state means another content.
 #[derive(PartialEq)]
 struct FileState {
     id: FileId,
@@ -64,19 +64,19 @@ impl SourceFiles {
         SourceFiles { number, files }
     }
 
-    /// Whether `path` is one of the files, by any name.
+    /// Returns whether `path` is one of the files, by any name.
     pub fn contain(&self, path: &Path) -> bool {
         FileId::at(path).is_some_and(|id| self.files.iter().any(|file| file.state.id == id))
     }
 
-    /// Whether `path` is one of the files, or the folder of a dataset of several files.
+    /// Returns whether `path` is one of the files, or the folder of a dataset of several files.
     pub fn contain_or_lie_in(&self, path: &Path) -> bool {
         let several = self.files.len() > 1;
         let is_folder = |id| self.files.iter().any(|f| f.path.parent().and_then(FileId::at) == Some(id));
         self.contain(path) || several && FileId::at(path).is_some_and(is_folder)
     }
 
-    /// Fails when a file is not what it was, or when a transaction on it is under way.
+    /// Fails when a file has changed, or when a transaction on it is under way.
     pub fn check(&self) -> Result<()> {
         let Some(file) = self.files.iter().find(|file| !file.is_unchanged()) else { return Ok(()) };
         let path = file.path.display().to_string();
@@ -111,7 +111,7 @@ impl Watched {
 
     fn is_unchanged(&self) -> bool {
         let same = fs::metadata(&self.path).is_ok_and(|metadata| FileState::new(&metadata) == self.state);
-        // They may go (another reader closed last) but not grow (a writer is at work).
+        // Sidecars may vanish (another reader closed last) but not grow (a writer is at work).
         same && sidecar_lengths(&self.path).iter().zip(&self.sidecars).all(|(now, then)| now <= then)
     }
 }
@@ -126,13 +126,13 @@ impl FileState {
     }
 }
 
-/// Whether both paths lead to one file, which need not exist yet.
+/// Returns whether both paths lead to one file, which need not exist yet.
 pub fn same_place(a: &Path, b: &Path) -> bool {
     let folder = |path: &Path| fs::canonicalize(folder_of(path)).ok();
     same_file(a, b) || a.file_name() == b.file_name() && folder(a).is_some_and(|f| folder(b) == Some(f))
 }
 
-/// Whether writing to `path` would destroy the source of a marked dataset that is open in this process.
+/// Returns whether writing to `path` would destroy the source of a marked dataset that is open in this process.
 pub fn is_being_read(path: &Path) -> bool {
     let sources = open_sources();
     if sources.is_empty() {
@@ -142,8 +142,8 @@ pub fn is_being_read(path: &Path) -> bool {
     sources.iter().any(|source| source.is_written_by(id))
 }
 
-/// Copies the files of the open source that is about to be overwritten at `path`. The copies stay only
-/// if it comes to that.
+/// Copies the files of the open source that is about to be overwritten at `path`. The copies stay only if the
+/// source is overwritten.
 pub fn save_copies(path: &Path) -> io::Result<()> {
     let Some(id) = FileId::at(path) else { return Ok(()) };
     let mut open = open_sources();
@@ -157,7 +157,7 @@ pub fn save_copies(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// `map.kml.saved`, or with a number when one is there from another accident.
+/// Creates `map.kml.saved`, or a numbered file when one exists from an earlier accident.
 fn create_copy_file(file: &Path) -> io::Result<(PathBuf, File)> {
     let names = std::iter::once(".saved".to_string()).chain((2..100).map(|i| format!(".saved{i}")));
     for name in names.map(|suffix| with_suffix(file, &suffix)) {
@@ -175,7 +175,7 @@ impl OpenSource {
     }
 }
 
-/// What SQLite puts beside a database that is being written.
+/// Returns the files that SQLite puts beside a database that is being written.
 pub fn sidecars(path: &Path) -> [PathBuf; 2] {
     ["-journal", "-wal"].map(|suffix| with_suffix(path, suffix))
 }

@@ -1,8 +1,8 @@
-//! A layer in the staging GeoPackage, and what of its features a GeoPackage would not give back.
+//! A layer in the staging GeoPackage, with the values of its features that a GeoPackage would lose.
 //!
-//! Fields get names of their own where names collide, and become text where GeoPackage has no such type. The little that
-//! is left (fields that are not set, −0.0 and NaN, texts in other encodings, ids that are not ascending) stands in a
-//! column of its own, which is made when it is first needed.
+//! Fields are renamed where names collide, and become text where GeoPackage has no such type. The rest (unset
+//! fields, −0.0 and NaN, texts in other encodings, ids that are not ascending) is kept in a separate column,
+//! which is created when it is first needed.
 
 use crate::{
     error::{Error, Result},
@@ -15,24 +15,24 @@ use std::ffi::CString;
 
 /// The column for the styles of features.
 const STYLE_COLUMN: &str = "OGR_STYLE";
-/// The column for the words of features from a GeoJSON file.
+/// The column for the native data of features from a GeoJSON file.
 const NATIVE_COLUMN: &str = "OGR_NATIVE";
-/// The column for what a GeoPackage would not give back.
+/// The column for values that a GeoPackage would lose.
 const LOST_COLUMN: &str = "OGR_VALUES";
 
 /// A layer that a host writes.
 pub struct StagedLayer {
-    /// What the host created it with.
+    /// Its specification by the host.
     pub spec: LayerSpec,
     /// Its name in the staging GeoPackage.
     pub name: String,
     number: usize,
-    /// Whether it ends as it is staged.
+    /// Whether the target is a GeoPackage as well.
     is_geopackage: bool,
-    /// Whether it ends as GeoJSON.
+    /// Whether the target is GeoJSON.
     is_json: bool,
     fields: Vec<Field>,
-    /// For every field of the layer, the one of the staging GeoPackage.
+    /// The field of the staging GeoPackage for every field of the layer.
     columns: Vec<Option<usize>>,
     /// Fields with several values each.
     lists: Vec<usize>,
@@ -41,21 +41,21 @@ pub struct StagedLayer {
     style_column: Option<usize>,
     native_column: Option<usize>,
     lost_column: Option<usize>,
-    /// How many features came before the first one that the host numbered.
+    /// How many features precede the first one that the host numbered.
     before_ids: Option<usize>,
     last_id: i64,
-    /// How many features there are.
+    /// The number of features.
     features: usize,
     /// Whether foreign members of its features hold places.
     pub has_foreign_places: bool,
 }
 
-/// What a GeoPackage would not give back of a feature.
+/// A value of a feature that a GeoPackage would lose.
 #[derive(Debug, PartialEq)]
 enum Lost {
     /// Its id, GDAL's null one when it has none.
     Id(i64),
-    /// That a field is not set.
+    /// An unset field.
     Unset(usize),
     /// A number.
     Real(usize, f64),
@@ -101,7 +101,7 @@ impl StagedLayer {
         })
     }
 
-    /// Adds a field; `name` is the one the host gave it.
+    /// Adds a field; `name` is its name from the host.
     pub fn add_field(&mut self, staged: &Output, field: &Field, name: &str) -> Result<()> {
         let base = if name.is_empty() { "field" } else { name };
         let mut unique = base.to_string();
@@ -121,7 +121,7 @@ impl StagedLayer {
         Ok(())
     }
 
-    /// Stages a feature; its id.
+    /// Stages a feature and returns its id.
     pub fn write(&mut self, staged: &Output, feature: FeatureRef) -> Result<i64> {
         let style = feature.style();
         let native = feature.native_data().filter(|_| self.is_json);
@@ -169,14 +169,14 @@ impl StagedLayer {
         if let Some(id) = id.filter(|_| keeps_id) {
             copy.set_id(id);
         }
-        // Complaints of GeoPackage are not those of another format.
+        // Messages of GeoPackage do not apply to another format.
         let staged_id = staged.write(self.number, &copy, !self.is_geopackage)?;
         self.last_id = self.last_id.max(staged_id);
         self.features += 1;
         Ok(id.unwrap_or(staged_id))
     }
 
-    /// What a GeoPackage would not give back of the fields of a feature.
+    /// Returns the values of the fields of a feature that a GeoPackage would lose.
     fn lost(&self, feature: FeatureRef) -> Vec<Lost> {
         let of_field = |(number, field): (usize, &Field)| {
             if feature.is_unset(number) {
@@ -194,7 +194,7 @@ impl StagedLayer {
         self.fields.iter().enumerate().filter_map(of_field).collect()
     }
 
-    /// Writes all features of the marked layer as the host gave them but for the geometries.
+    /// Writes all features of the marked layer with the attributes that the host gave them.
     pub fn write_marked(&self, view: &View, output: &Output) -> Result<()> {
         let fields = self.fields_of_columns();
         let mut written = 0;
@@ -226,7 +226,7 @@ impl StagedLayer {
         }
     }
 
-    /// For every column of the staging GeoPackage, the field of the layer.
+    /// Returns the field of the layer for every column of the staging GeoPackage.
     fn fields_of_columns(&self) -> Vec<Option<usize>> {
         let own = [self.style_column, self.native_column, self.lost_column];
         let last = self.columns.iter().chain(&own).flatten().max();

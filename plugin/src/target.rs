@@ -1,4 +1,4 @@
-//! Where the marked map, its reference and its record shall go, checked before anything is written.
+//! The places of the marked map, its reference and its record, which are checked before anything is written.
 
 use crate::{
     error::{Error, Result},
@@ -19,15 +19,15 @@ use std::{
 
 /// The file to write.
 pub struct Target {
-    /// What to call it in messages.
+    /// Its name for messages.
     pub name: String,
-    /// Where it will be, without links.
+    /// Its path without links.
     pub path: PathBuf,
     /// Its format.
     pub format: &'static Format,
-    /// Where the unmarked map will be.
+    /// The path of the unmarked map.
     pub reference: PathBuf,
-    /// Whether a file that is there is replaced.
+    /// Whether an existing file is replaced.
     pub replaces: bool,
 }
 
@@ -35,15 +35,16 @@ pub struct Target {
 pub struct Places {
     /// Where the unmarked map is staged.
     pub staged: PathBuf,
-    /// Where the record is staged, and where it goes.
+    /// Where the record is staged, and its final path.
     pub record: Option<(PathBuf, PathBuf)>,
-    /// The one of the target.
+    /// The workplace of the target.
     pub main: Workplace,
     _others: Vec<Workplace>,
 }
 
 impl Target {
-    /// Finds the places of the target and the reference. What is there now may go when the workplaces are made.
+    /// Finds the places of the target and the reference. Files that occupy them now may vanish when the
+    /// workplaces are made.
     pub fn new(name: &str, creation: &Creation) -> Result<Self> {
         let format = Format::find(creation.format.as_deref(), Path::new(name))?;
         let path = place(Path::new(name))?;
@@ -58,7 +59,7 @@ impl Target {
         Ok(Target { name: name.into(), path, format, reference, replaces: creation.overwrite })
     }
 
-    /// Fails when something is in the way.
+    /// Fails when a file is in the way.
     fn check_free(&self) -> Result<()> {
         let exists = |path: &Path, remedy| {
             Err(meshmark_dataset::Error::Exists { path: path.display().to_string(), remedy }.into())
@@ -76,12 +77,13 @@ impl Target {
         }
     }
 
-    /// The name of the file, without folders.
+    /// Returns the name of the file, without folders.
     pub fn file_name(&self) -> &OsStr {
         self.path.file_name().expect("a place has a name")
     }
 
-    /// Makes the workplaces, which removes what killed processes left, and checks that nothing is in the way.
+    /// Makes the workplaces, which removes the remains of killed processes, and checks that no file is in the
+    /// way.
     pub fn places(&self, request: &MarkingRequest) -> Result<Places> {
         if same_file(&self.path, request.key_path()) {
             return Err(Error::SameFile { option: "KEY", other: "the target" });
@@ -116,8 +118,8 @@ impl Target {
         Ok(Places { staged, record, main, _others: others })
     }
 
-    /// Files of the dataset that is replaced which are not its main file: those that the new one in `made` has
-    /// too, and those that a Shapefile's readers would take for parts of the new one.
+    /// Returns the files of the replaced dataset other than its main file: those that the new one in `made`
+    /// has too, and those that readers of Shapefiles would take for parts of the new one.
     pub fn side_files(&self, made: &Path) -> Result<Vec<PathBuf>> {
         if !self.path.is_file() {
             return Ok(Vec::new());
@@ -142,7 +144,7 @@ fn folder(path: &Path) -> &Path {
     path.parent().expect("a place is in a folder")
 }
 
-/// The absolute path of a file that is there, links followed, or that can be made.
+/// Returns the absolute path of a file that exists, with links followed, or that can be made.
 fn place(path: &Path) -> Result<PathBuf> {
     let refused = |what| Err(Error::NotAFile { path: path.display().to_string(), what });
     if path.to_string_lossy().starts_with("/vsi") {
@@ -163,7 +165,7 @@ fn place(path: &Path) -> Result<PathBuf> {
     }
 }
 
-/// Another program's journal would be applied to the new file.
+/// Fails when another program writes to the file, as its journal would be applied to the new one.
 fn check_not_busy(path: &Path) -> Result<()> {
     let is_written = |sidecar: &PathBuf| sidecar.metadata().is_ok_and(|metadata| metadata.len() > 0);
     match sidecars(path).into_iter().find(is_written) {
@@ -179,7 +181,7 @@ fn check_not_busy(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// What is wrong with a target, if anything.
+    /// Returns the fault of a target, or an empty text.
     fn fault(folder: &Path, name: &str, reference: &str, overwrite: bool) -> String {
         let path = |name: &str| folder.join(name).display().to_string();
         let creation = Creation { reference_path: path(reference), format: None, overwrite };

@@ -1,4 +1,5 @@
-//! The write side: what a host writes is staged; when it closes the dataset, it is marked and published.
+//! The write side: the features of a host are staged; when the host closes the dataset, they are marked and
+//! published.
 //!
 //! ```text
 //! host ──layers, fields──> schema (the real driver, an empty dataset: answers what the format can do)
@@ -6,7 +7,7 @@
 //! close: staging ──marking──> the real driver ──read_back──> publication
 //! ```
 //!
-//! Nothing a host can do after a failure leads to publication: a writer that failed once only cleans up.
+//! After a failure no call of a host leads to publication: a writer that failed once only cleans up.
 
 use crate::{
     error::{Error, Result},
@@ -25,25 +26,25 @@ use meshmark_dataset::{
 };
 use std::{fs, path::Path};
 
-/// Marks an open dataset; the border knows how.
+/// The function that marks an open dataset; the border provides it.
 pub type Mark<'a> = &'a dyn Fn(&MarkingRequest, &Borrowed) -> Result<Marking>;
 
 /// A dataset under construction.
 pub struct Writer {
-    // In this order they are dropped: datasets before the folders they are in.
+    // Fields are dropped in this order: datasets before their folders.
     schema: Output,
     staged: Output,
     target: Target,
     request: MarkingRequest,
     layers: Vec<StagedLayer>,
     open_transactions: usize,
-    /// Why nothing will be published.
+    /// The reason why nothing will be published.
     failed: Option<String>,
     places: Places,
 }
 
 impl Writer {
-    /// Checks where to write, and makes workplaces there.
+    /// Checks the places of the files and makes workplaces there.
     pub fn new(target: Target, request: MarkingRequest) -> Result<Self> {
         let places = target.places(&request)?;
         let driver = target.format.driver;
@@ -54,17 +55,17 @@ impl Writer {
         Ok(Writer { schema, staged, target, request, layers, open_transactions, failed, places })
     }
 
-    /// The empty dataset of the real driver that hosts are shown.
+    /// Returns the empty dataset of the real driver that hosts are shown.
     pub fn schema(&self) -> &Output {
         &self.schema
     }
 
-    /// What to call the target in messages.
+    /// Returns the name of the target for messages.
     pub fn name(&self) -> &str {
         &self.target.name
     }
 
-    /// Creates a layer; its number.
+    /// Creates a layer and returns its number.
     pub fn add_layer(&mut self, spec: LayerSpec) -> Result<usize> {
         self.keep_failure(|writer| {
             let format = writer.target.format;
@@ -86,7 +87,8 @@ impl Writer {
         })
     }
 
-    /// Creates a field. That a format has no such field is the host's to know, not a failure of the dataset.
+    /// Creates a field. A format without such a field is reported to the host and is not a failure of the
+    /// dataset.
     pub fn add_field(&mut self, layer: usize, field: &Field, approximate: bool) -> Result<()> {
         let before = self.schema.field_count(layer);
         self.schema.add_field(layer, field, approximate, false)?;
@@ -110,19 +112,19 @@ impl Writer {
         })
     }
 
-    /// A host begins a transaction.
+    /// Begins a transaction of a host.
     pub fn begin(&mut self) {
         self.open_transactions += 1;
     }
 
-    /// A host commits one; false when there is none.
+    /// Commits a transaction of a host; returns false when there is none.
     pub fn commit(&mut self) -> bool {
         let open = self.open_transactions > 0;
         self.open_transactions -= usize::from(open);
         open
     }
 
-    /// A host takes back what it wrote: then the rest is not the whole either.
+    /// Rolls a transaction of a host back, after which the dataset is incomplete.
     pub fn roll_back(&mut self) {
         self.open_transactions = self.open_transactions.saturating_sub(1);
         self.failed.get_or_insert("a transaction was rolled back".into());
@@ -139,8 +141,8 @@ impl Writer {
         result
     }
 
-    /// Marks, writes, reads back and publishes; `host_failure` is what the host reported before it closed the
-    /// dataset. Returns what the user should read though nothing failed.
+    /// Marks, writes, reads back and publishes; `host_failure` is the failure that the host reported before
+    /// it closed the dataset. Returns warnings for the user.
     pub fn finish(
         self,
         described: &Described,
@@ -151,7 +153,7 @@ impl Writer {
         if let Some(reason) = self.why_not(host_failure) {
             return Err(Error::Unfinished(reason));
         }
-        // Dropped in reverse order: datasets before the folders they are in.
+        // Variables are dropped in reverse order: datasets before their folders.
         let Writer { places, target, mut request, layers, schema, staged, .. } = self;
         request.rename_layers(|name| {
             layers.iter().find(|layer| layer.spec.name == name).map(|layer| &*layer.name)
@@ -185,7 +187,7 @@ impl Writer {
     }
 }
 
-/// Writes all marked layers by the real driver, one after the other; their names in it.
+/// Writes all marked layers by the real driver, one after the other, and returns their names in it.
 fn write_marked(
     path: &Path,
     target: &Target,

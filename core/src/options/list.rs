@@ -1,7 +1,7 @@
-//! Lists in one text, as a CSV record has them: names between commas, those with a comma in double quotes, quotes
-//! inside them doubled.
+//! Lists as text in the syntax of a CSV record: commas separate names, double quotes enclose a name with a
+//! comma, and quotes inside them are doubled.
 
-/// The names of a list; `None` where a quote is not closed, or something follows one.
+/// Splits a list into its names; `None` where a quote is not closed or text follows one.
 pub fn split_list(text: &str) -> Option<Vec<String>> {
     let mut names = Vec::new();
     let mut rest = text;
@@ -22,7 +22,7 @@ pub fn split_list(text: &str) -> Option<Vec<String>> {
     }
 }
 
-/// The list of these names.
+/// Joins names to a list.
 pub fn join_list<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
     let needs_quotes =
         |name: &str| name.contains(',') || name.starts_with('"') || name.is_empty() || name.trim() != name;
@@ -33,7 +33,7 @@ pub fn join_list<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
     names.into_iter().map(quote).collect::<Vec<_>>().join(", ")
 }
 
-/// The name before the closing quote, and what follows that.
+/// Returns the name before the closing quote, and the text after it.
 fn unquote(quoted: &str) -> Option<(String, &str)> {
     let (mut name, mut rest) = (String::new(), quoted);
     loop {

@@ -1,13 +1,13 @@
-//! The table as GDAL and people read it.
+//! The table of options as XML for GDAL and as Markdown for the docs.
 
 use super::{CREATION_OPTIONS, Kind, OPTIONS, OptionSpec};
 
-/// The XML list of open options a GDAL driver declares (DMD_OPENOPTIONLIST).
+/// Returns the XML list of open options a GDAL driver declares (DMD_OPENOPTIONLIST).
 pub fn open_option_list_xml() -> String {
     list_xml("OpenOptionList", OPTIONS.iter())
 }
 
-/// The XML list of dataset creation options a GDAL driver declares (DMD_CREATIONOPTIONLIST).
+/// Returns the XML list of dataset creation options a GDAL driver declares (DMD_CREATIONOPTIONLIST).
 pub fn creation_option_list_xml() -> String {
     list_xml("CreationOptionList", OPTIONS.iter().chain(CREATION_OPTIONS))
 }
@@ -33,7 +33,7 @@ fn option_xml(option: &OptionSpec) -> String {
     format!("<Option name='{}' {attributes}>{values}</Option>", option.name)
 }
 
-/// Options as a Markdown table, for the docs.
+/// Returns options as a Markdown table, for the docs.
 pub fn option_table_markdown(options: &[OptionSpec]) -> String {
     let row = |o: &OptionSpec| {
         format!("| `{}` | {} | {} |\n", o.name, o.default.map_or("".into(), |d| format!("`{d}`")), o.help)

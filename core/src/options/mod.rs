@@ -1,5 +1,5 @@
-//! The watermark options: one table that makes the driver's option list, the parser, the flags of
-//! the command line and the table in the docs.
+//! The watermark options: one table defines the driver's option list, the parser, the flags of the command
+//! line and the table in the docs.
 
 mod list;
 mod listing;
@@ -16,19 +16,19 @@ pub use table::{
 
 use crate::{Error, Result, key::SecretKey, message::Message, whitening::whiten};
 
-/// What the mark says: a name, or the bits themselves.
+/// The content of a mark: a name, or the bits themselves.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Subject {
     /// The message is a keyed hash of this text.
     Recipient(String),
     /// The message, which the key whitens before it is coded.
     Message(Message),
-    /// The message of a mark of the time before whitening: its own bits are coded.
+    /// The message of a mark made before whitening existed: its own bits are coded.
     Unwhitened(Message),
 }
 
 impl Subject {
-    /// The bits that the code carries under a key.
+    /// Returns the bits that the code carries under a key.
     pub fn carried(&self, key: &SecretKey) -> Message {
         match self {
             Subject::Recipient(text) => key.recipient_message(text),
@@ -37,7 +37,7 @@ impl Subject {
         }
     }
 
-    /// The message as records and reports have it, of the bits that the code carries.
+    /// Returns the message of records and reports for the bits that the code carries.
     pub fn message_of(&self, carried: &Message, key: &SecretKey) -> Message {
         match self {
             Subject::Message(_) => key.unwhitened(carried),
@@ -45,7 +45,7 @@ impl Subject {
         }
     }
 
-    /// The message as records and reports have it.
+    /// Returns the message of records and reports.
     pub fn message(&self, key: &SecretKey) -> Message {
         match self {
             Subject::Recipient(text) => key.recipient_message(text),
@@ -53,7 +53,7 @@ impl Subject {
         }
     }
 
-    /// The recipient, when the message is made from one.
+    /// Returns the recipient, when the message is made from one.
     pub fn recipient(&self) -> Option<&str> {
         match self {
             Subject::Recipient(text) => Some(text),
@@ -80,12 +80,11 @@ pub struct Options {
 }
 
 impl Options {
-    /// Parses name-value pairs; names in any case. Where the message is not given, it is taken to be as long
-    /// as a recipient's.
+    /// Parses name-value pairs; names may be in any case. A message that is not given counts as long as a
+    /// recipient's.
     ///
-    /// # Errors
-    /// An unknown name, a name given twice, a value that is not what its row says, both RECIPIENT and
-    /// MESSAGE, bad hexadecimal digits.
+    /// # Errors Fails on an unknown name, a name given twice, a value that its row excludes, both RECIPIENT
+    /// and MESSAGE, and bad hexadecimal digits.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(OPTIONS, pairs)?;
         let precision = values.number("PRECISION")?;
@@ -117,7 +116,7 @@ impl Options {
 }
 
 impl Default for Parameters {
-    /// Those of a message as long as a recipient's.
+    /// Returns the parameters of a message as long as a recipient's.
     fn default() -> Self {
         Options::parse([]).expect("the defaults are legal").parameters
     }
@@ -191,7 +190,7 @@ impl<'a> Values<'a> {
         self.parsed(name, |_, text| from_name(text))
     }
 
-    /// The value given, or the default, as `parse` understands it.
+    /// Returns the value given, or the default, as `parse` understands it.
     fn parsed<T>(&self, name: &str, parse: impl Fn(Kind, &str) -> Option<T>) -> Result<Option<T>> {
         let spec = spec(name).expect("a row of the table");
         let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
@@ -214,8 +213,7 @@ pub struct Creation {
 impl Creation {
     /// Parses the rows of [`CREATION_OPTIONS`].
     ///
-    /// # Errors
-    /// A name that is none of them or given twice, an illegal value, no REFERENCE.
+    /// # Errors Fails on an unknown name, a name given twice, an illegal value, and a missing REFERENCE.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(CREATION_OPTIONS, pairs)?;
         let reference_path = values.text("REFERENCE")?.ok_or(Error::NoReference)?;
@@ -231,7 +229,7 @@ impl Creation {
         Ok(Creation { reference_path, format: values.text("FORMAT")?, overwrite })
     }
 
-    /// Whether an option is one of [`CREATION_OPTIONS`].
+    /// Returns whether an option is one of [`CREATION_OPTIONS`].
     pub fn has(name: &str) -> bool {
         CREATION_OPTIONS.iter().any(|o| o.name.eq_ignore_ascii_case(name))
     }

@@ -13,9 +13,9 @@ pub struct Parameters {
     pub chip_rate: usize,
     /// d, the smallest number of vertices in a patch.
     pub patch_size: usize,
-    /// No vertex moves further, metres on the ground.
+    /// No vertex moves further than this, metres on the ground.
     pub tolerance_m: f64,
-    /// What moves as one.
+    /// Which vertices move as one.
     pub shape: Rigidity,
     /// Which functions carry the mark.
     pub laplacian: Laplacian,
@@ -39,32 +39,32 @@ pub enum Code {
 }
 
 impl Code {
-    /// The words of the option CODE.
+    /// The values of CODE.
     pub const NAMES: [&str; 2] = ["REPETITION", "LDPC"];
 
-    /// The code of this name, in any case.
+    /// Looks up the code of this name, in any case.
     pub fn from_name(name: &str) -> Option<Self> {
         let index = Self::NAMES.iter().position(|known| known.eq_ignore_ascii_case(name))?;
         Some([Code::Repetition, Code::Ldpc][index])
     }
 
-    /// The name in lower case, as records and reports have it.
+    /// Returns the name in lower case, for records and reports.
     pub fn name(self) -> String {
         Self::NAMES[self as usize].to_lowercase()
     }
 
-    /// CODE when it is not given: LDPC for messages it can carry, as it reads more of them from the same
-    /// displacement (docs/evaluation.md).
+    /// Returns CODE when it is not given: LDPC for messages it can carry, as it recovers more of them from
+    /// the same displacement (docs/evaluation.md).
     pub fn default_for(message_bits: usize) -> Self {
         if message_bits == LDPC_MESSAGE_BITS { Code::Ldpc } else { Code::Repetition }
     }
 
-    /// CHIP_RATE when it is not given: the same displacement with either code.
+    /// Returns CHIP_RATE when it is not given, for the same displacement with either code.
     pub fn default_chip_rate(self) -> usize {
         2 / self.expansion()
     }
 
-    /// Channel bits for each message bit.
+    /// Returns the number of channel bits for each message bit.
     pub(crate) fn expansion(self) -> usize {
         match self {
             Code::Repetition => 1,
@@ -77,21 +77,21 @@ impl Code {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rigidity {
-    /// None but what hangs on others.
+    /// None but hanging vertices with their anchors.
     Free,
     /// Those of a building: a group of polygons that share vertices or walls, see [`crate::bodies`].
     Rigid,
 }
 
 impl Rigidity {
-    /// What SHAPE may be.
+    /// The values of SHAPE.
     pub const NAMES: [&str; 2] = ["FREE", "RIGID"];
 
     pub(super) fn from_name(name: &str) -> Option<Self> {
         [Rigidity::Free, Rigidity::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
     }
 
-    /// The option's value.
+    /// Returns the option's value.
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }
@@ -103,19 +103,19 @@ impl Rigidity {
 pub enum Laplacian {
     /// I − D⁻¹A of the mesh (the paper).
     Biggs,
-    /// The Dirichlet Laplacian of the mesh: it knows distances and angles.
+    /// The Dirichlet Laplacian of the mesh, which depends on distances and angles.
     Cotangent,
 }
 
 impl Laplacian {
-    /// What BASIS may be.
+    /// The values of BASIS.
     pub const NAMES: [&str; 2] = ["BIGGS", "COTANGENT"];
 
     pub(super) fn from_name(name: &str) -> Option<Self> {
         [Laplacian::Biggs, Laplacian::Cotangent].into_iter().find(|l| l.name().eq_ignore_ascii_case(name))
     }
 
-    /// The option's value.
+    /// Returns the option's value.
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }

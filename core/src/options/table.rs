@@ -1,15 +1,15 @@
-//! The table of the options, and how they are written.
+//! The table of the options and their spelling.
 
 use super::{Code, Laplacian, Rigidity};
 
-/// The smallest and the largest PATCH_SIZE: fewer vertices carry no message worth the name, more
-/// need minutes and gigabytes a solve.
+/// The smallest and the largest PATCH_SIZE: fewer vertices carry no useful message, more need minutes and
+/// gigabytes for each solution.
 pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
 
-/// How long the message of a RECIPIENT is.
+/// The length of the message of a RECIPIENT.
 pub const RECIPIENT_BITS: usize = 128;
 
-/// What an option's value must be.
+/// The legal values of an option.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// Any text that is not empty.
@@ -23,7 +23,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What a legal value is, to complete "… is not".
+    /// Describes a legal value, to complete "… is not".
     pub(crate) fn legal(&self) -> String {
         match self {
             Kind::Text => "a text".into(),
@@ -44,7 +44,7 @@ pub enum Spelling {
 }
 
 impl Spelling {
-    /// An option of this name in the table.
+    /// Returns an option of this name in the table.
     pub fn name(self, name: &str) -> String {
         match self {
             Spelling::OpenOption => name.into(),
@@ -52,7 +52,7 @@ impl Spelling {
         }
     }
 
-    /// The option with a value.
+    /// Returns the option with a value.
     pub fn value(self, name: &str, value: impl std::fmt::Display) -> String {
         let between = match self {
             Spelling::OpenOption => "=",
@@ -67,7 +67,7 @@ impl Spelling {
 pub struct OptionSpec {
     /// Its name in the driver, upper case; `--lower-case` on the command line.
     pub name: &'static str,
-    /// What its value must be.
+    /// Its legal values.
     pub kind: Kind,
     /// Its value when it is not given.
     pub default: Option<&'static str>,
@@ -184,7 +184,7 @@ pub const OPTIONS: &[OptionSpec] = &[
     ),
 ];
 
-/// What the driver needs besides when it writes, in the order of the docs.
+/// The further options of a driver that writes, in the order of the docs.
 pub const CREATION_OPTIONS: &[OptionSpec] = &[
     row(
         "REFERENCE",

@@ -1,10 +1,10 @@
-//! The segments of a geometry, and what is near them.
+//! The segments of a geometry, with a search for near ones.
 
 use crate::Outline;
 use meshmark_core::orientation::orientation;
 use rstar::{AABB, Envelope, PointDistance, RTree, RTreeObject, primitives::Line};
 
-/// With more segments, they are put into a tree.
+/// More segments than this are put into a tree.
 const MOST_UNSORTED: usize = 64;
 
 /// A geometry as segments; points are segments of no length.
@@ -21,7 +21,7 @@ enum Segments {
 }
 
 impl Linework {
-    /// With x and y multiplied by `scale`.
+    /// Creates the segments of an outline with x and y multiplied by `scale`.
     pub fn new(outline: &Outline, scale: [f64; 2]) -> Self {
         let place = |p: [f64; 2]| [p[0] * scale[0], p[1] * scale[1]];
         let (mut firsts, mut segments) = (Vec::new(), Vec::new());
@@ -49,7 +49,7 @@ impl Linework {
         }
     }
 
-    /// The segments whose bounding boxes meet this one.
+    /// Returns the segments whose bounding boxes meet this one.
     fn near(&self, bounds: AABB<[f64; 2]>) -> Box<dyn Iterator<Item = &Line<[f64; 2]>> + '_> {
         match &self.segments {
             Segments::Few(all) => {
@@ -67,8 +67,8 @@ impl Linework {
         distance2.unwrap_or(0.0).sqrt()
     }
 
-    /// Whether two geometries of closed rings have no place in common, as far as that is seen without computing
-    /// their intersection. Exact where it says yes.
+    /// Returns whether two geometries of closed rings are disjoint, as far as this can be decided without
+    /// computing their intersection. It is exact where the result is true.
     pub fn is_apart_from(&self, other: &Linework) -> bool {
         let (few, many) = if self.len() <= other.len() { (self, other) } else { (other, self) };
         let meets = |line: &Line<[f64; 2]>| many.near(line.envelope()).any(|near| may_meet(line, near));
@@ -77,7 +77,8 @@ impl Linework {
             && !many.firsts.iter().any(|point| few.encloses(*point))
     }
 
-    /// Whether a point that is on no segment is inside: the number of segments to its right is odd.
+    /// Returns whether a point on no segment is inside, which it is when the number of segments to its right
+    /// is odd.
     fn encloses(&self, [x, y]: [f64; 2]) -> bool {
         if !self.bounds.contains_point(&[x, y]) {
             return false;
@@ -92,7 +93,8 @@ impl Linework {
     }
 }
 
-/// The Hausdorff distance of two geometries whose vertices correspond, with x and y multiplied by `scale`.
+/// Returns the Hausdorff distance of two geometries whose vertices correspond, with x and y multiplied by
+/// `scale`.
 pub fn hausdorff(before: &Outline, after: &Outline, scale: [f64; 2]) -> f64 {
     let place = |p: &[f64; 2]| [p[0] * scale[0], p[1] * scale[1]];
     let [from, to] = [before, after].map(|outline| outline.chains.iter().flatten().map(place));
@@ -110,7 +112,7 @@ pub fn hausdorff(before: &Outline, after: &Outline, scale: [f64; 2]) -> f64 {
     largest
 }
 
-/// False when the ends of one are strictly on one side of the other.
+/// Returns false when the ends of one are strictly on one side of the other.
 fn may_meet(s: &Line<[f64; 2]>, t: &Line<[f64; 2]>) -> bool {
     let one_side = |s: &Line<[f64; 2]>, t: &Line<[f64; 2]>| {
         let (a, b) = (orientation(s.from, s.to, t.from), orientation(s.from, s.to, t.to));

@@ -1,7 +1,7 @@
-//! What marking does to geometries: areas, Hausdorff distances, validity and overlaps.
+//! The quality of marked geometries: areas, Hausdorff distances, validity and overlaps.
 //!
-//! Validity and areas of intersections are GEOS's; what cannot overlap is not asked about. Under an error handler that
-//! shows them, GEOS says what it does not like about invalid geometries.
+//! GEOS decides validity and computes areas of intersections, but only of geometries that may overlap. An
+//! error handler may show its messages about invalid geometries.
 
 mod linework;
 mod overlaps;
@@ -17,16 +17,16 @@ use meshmark_core::{
 use rayon::prelude::*;
 use sights::Sight;
 
-/// A map as GEOS sees it.
+/// The state of a map, measured by GEOS.
 pub struct State {
-    /// Of every geometry.
+    /// The measurements of every geometry.
     sights: Vec<Sight>,
-    /// Of pairs of valid polygons.
+    /// The common areas of pairs of valid polygons.
     common: overlaps::CommonAreas,
 }
 
 impl State {
-    /// Looks at all geometries.
+    /// Measures all geometries.
     pub fn measure(outlines: Outlines) -> Self {
         let sights: Vec<Sight> = (0..outlines.count)
             .into_par_iter()
@@ -42,9 +42,9 @@ impl State {
 pub struct Quality {
     /// Areas of polygons.
     pub areas: Areas,
-    /// How far features are from where they were, as sets of points.
+    /// Hausdorff distances between features before and after.
     pub hausdorff: Hausdorff,
-    /// By GEOS.
+    /// Validity by GEOS.
     pub validity: Validity,
     /// Polygons that overlap, by GEOS.
     pub overlaps: Overlaps,
@@ -56,18 +56,18 @@ pub struct Quality {
 
 /// A map before and after.
 pub struct BeforeAfter<'a> {
-    /// The geometries before, and what they look like.
+    /// The geometries before, and their state.
     pub before: (Outlines<'a>, &'a State),
-    /// The geometries after, and what they look like.
+    /// The geometries after, and their state.
     pub after: (Outlines<'a>, &'a State),
     /// Metres per unit.
     pub measure: Measure<'a>,
-    /// The grid of the map after, CRS units; 0 without: overlaps up to a cell of it are slivers.
+    /// The grid of the map after, CRS units; 0 without one. Overlaps up to a cell of it are slivers.
     pub grid: f64,
 }
 
 impl BeforeAfter<'_> {
-    /// Compares.
+    /// Compares the two states.
     pub fn quality(&self) -> Quality {
         let (validity, newly_invalid) = self.validity();
         let (overlaps, newly_overlapping) = self.overlaps();
@@ -112,7 +112,7 @@ impl BeforeAfter<'_> {
         Hausdorff { p99_m: spread.p99, max_m: spread.max }
     }
 
-    /// Metres per unit at a geometry.
+    /// Returns metres per unit at a geometry.
     fn scale(&self, outline: &Outline) -> [f64; 2] {
         self.measure.metres_per_unit(outline.first().unwrap_or_default())
     }

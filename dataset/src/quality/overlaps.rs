@@ -1,4 +1,4 @@
-//! Polygons that overlap.
+//! The overlaps of polygons.
 
 use super::{
     linework::Linework,
@@ -18,7 +18,7 @@ use std::{
 
 /// Overlaps up to this are slivers of rounding, square metres.
 const SLIVER_M2: f64 = 1e-6;
-/// Polygons with more vertices are sorted once, not for every neighbour.
+/// The segments of polygons with more vertices are sorted once, not for every neighbour.
 const MANY_VERTICES: usize = 256;
 
 /// The bounding box of a polygon, and its number.
@@ -27,7 +27,7 @@ type NumberedBounds = GeomWithData<Rectangle<[f64; 2]>, u32>;
 /// Pairs of polygons, the lower number first, with the area they have in common, CRS units squared.
 pub(super) type CommonAreas = BTreeMap<[u32; 2], f64>;
 
-/// What pairs of valid polygons have in common, CRS units squared, where it is more than nothing.
+/// Computes the common areas of pairs of valid polygons that have one, CRS units squared.
 pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> CommonAreas {
     let polygons = (0u32..).zip(sights).filter(|(_, sight)| sight.is_valid && sight.area > 0.0);
     let boxes: Vec<NumberedBounds> =
@@ -44,7 +44,7 @@ pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> CommonAreas 
     boxes.par_iter().flat_map_iter(of_polygon).collect()
 }
 
-/// The segments of all polygons with many vertices; none for those that are not all rings.
+/// Returns the segments of all polygons with many vertices; `None` for those that do not consist of rings.
 fn large(outlines: Outlines, boxes: &[NumberedBounds]) -> BTreeMap<u32, Option<Linework>> {
     let sorted = |polygon: &NumberedBounds| {
         let outline = (outlines.get)(polygon.data as usize);
@@ -54,7 +54,7 @@ fn large(outlines: Outlines, boxes: &[NumberedBounds]) -> BTreeMap<u32, Option<L
     boxes.par_iter().filter_map(sorted).collect()
 }
 
-/// The segments of a geometry of closed rings, none for others, arcs among them.
+/// Returns the segments of a geometry of closed rings; `None` for others, such as those with arcs.
 fn rings(outline: &Outline) -> Option<Linework> {
     let is_ring = |(chain, kind): (&Vec<[f64; 2]>, &Step)| {
         matches!(kind, Step::Shell | Step::Hole) && chain.first() == chain.last()
@@ -69,7 +69,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// What a polygon has in common with others.
+    /// Computes the common areas of a polygon with others.
     fn common(&self, polygon: u32, others: &[u32]) -> Vec<([u32; 2], f64)> {
         if others.is_empty() {
             return Vec::new();
@@ -98,8 +98,9 @@ fn are_apart(one: &Option<Linework>, other: &Option<Linework>) -> bool {
     one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one.is_apart_from(other))
 }
 
-/// Overlaps among polygons that are valid before and after, and which are new. `common` are the common areas before
-/// and after, `scale` metres per unit at a polygon, `grid` as in [`super::BeforeAfter`].
+/// Counts the overlaps among polygons that are valid before and after, and lists the new ones. `common` are
+/// the common areas before and after, `scale` metres per unit at a polygon, `grid` as in
+/// [`super::BeforeAfter`].
 pub(super) fn compare(
     common: [&CommonAreas; 2],
     is_valid: impl Fn(u32) -> bool,
@@ -125,11 +126,11 @@ pub(super) fn compare(
     (counts, new.iter().map(|(pair, _)| *pair).collect())
 }
 
-/// The area that two polygons have in common, square metres.
+/// The common area of two polygons, square metres.
 struct Overlap {
     before_m2: f64,
     after_m2: f64,
-    /// Up to this, it is rounding.
+    /// Up to this area the overlap is an effect of rounding.
     sliver_m2: f64,
 }
 
@@ -138,7 +139,8 @@ impl Overlap {
         area_m2 > self.sliver_m2
     }
 
-    /// A sliver that grows over the limit by less than another one is none: it was there.
+    /// Returns whether the overlap is new. A sliver that grows by no more than another sliver is
+    /// not: it existed before.
     fn is_new(&self) -> bool {
         !self.is_more(self.before_m2) && self.is_more(self.after_m2 - self.before_m2)
     }
@@ -181,7 +183,7 @@ mod tests {
         format!("POLYGON {}", square(x, y, size))
     }
 
-    /// A circle of so many vertices.
+    /// Returns a circle of so many vertices.
     fn circle(vertices: usize, radius: f64) -> String {
         let place = |i: usize| {
             let (y, x) = (std::f64::consts::TAU * (i % vertices) as f64 / vertices as f64).sin_cos();

@@ -1,4 +1,4 @@
-//! Geometries as they are measured one by one.
+//! The measurements of single geometries.
 
 use crate::Outline;
 use rstar::{AABB, Envelope};
@@ -7,16 +7,16 @@ use std::borrow::Cow;
 /// The geometries of a map, numbered; the same numbers before and after.
 #[derive(Clone, Copy)]
 pub struct Outlines<'a> {
-    /// How many.
+    /// Their number.
     pub count: usize,
-    /// One of them.
+    /// Returns one of them.
     pub get: &'a (dyn Fn(usize) -> Cow<'a, Outline> + Sync),
 }
 
-/// A geometry as GEOS sees it.
+/// A geometry, measured by GEOS.
 pub(super) struct Sight {
     pub(super) is_valid: bool,
-    /// CRS units squared; 0 without.
+    /// Its area, CRS units squared; 0 without one.
     pub(super) area: f64,
     /// Its bounding box, inside out for an empty one.
     pub(super) bounds: AABB<[f64; 2]>,
