@@ -15,7 +15,7 @@ pub struct Histogram {
 
 impl Histogram {
     /// Of finite values, in at most about `bins` bins; none without values.
-    pub fn of(values: &[f64], bins: usize) -> Option<Self> {
+    pub fn of_values(values: &[f64], bins: usize) -> Option<Self> {
         let least = values.iter().copied().reduce(f64::min)?;
         let most = values.iter().copied().reduce(f64::max)?;
         let width = round_up((most - least) / bins as f64);
@@ -44,11 +44,11 @@ mod tests {
 
     #[test]
     fn every_value_is_in_a_bin_of_round_width() {
-        let found = Histogram::of(&[-0.31, 0.0, 0.05, 0.29], 8).unwrap();
+        let found = Histogram::of_values(&[-0.31, 0.0, 0.05, 0.29], 8).unwrap();
         assert_eq!((found.width, found.counts.iter().sum::<usize>()), (0.1, 4));
         assert!((found.from + 0.4).abs() < 1e-12 && found.counts == [1, 0, 0, 0, 2, 0, 1], "{found:?}");
-        assert_eq!(Histogram::of(&[2.0, 2.0], 8).unwrap().counts, [2]);
-        assert_eq!(Histogram::of(&[], 8), None);
+        assert_eq!(Histogram::of_values(&[2.0, 2.0], 8).unwrap().counts, [2]);
+        assert_eq!(Histogram::of_values(&[], 8), None);
     }
 
     #[test]

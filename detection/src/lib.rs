@@ -1,10 +1,47 @@
 //! Detection: two maps as numbers in, a verdict out. No files, no GDAL.
 //!
 //! ```text
-//! reference ─► patches ────────────────────────────┐
-//!                                                  ▼
+//! reference ─► patches ───────────────────────┐
+//!                                             ▼
 //! suspect ─► registration ─► matching ─► tracking, demodulation ─► decision
-//!                   no key                   the key                 the message
+//!                 no key is used              │ the key                │ the message
+//! ```
+//!
+//! | question | where it is answered |
+//! |---|---|
+//! | Where does the suspect lie on the reference? | [`registration`] |
+//! | Which vertex is which, and within which radius? | [`matching`] |
+//! | What moved the vertices besides the mark? | `tracking.rs`, and `deformation` of `meshmark-core` |
+//! | What do the displacements say under a key? | [`Matched::demodulate`] |
+//! | Match, no match, or inconclusive, at what p-value? | [`decision`] |
+//!
+//! A synthetic town is marked for a recipient, shifted, and recognised as that recipient's copy:
+//!
+//! ```
+//! use meshmark_core::{embedding, ground::Ground, key::SecretKey, map_data::{ChainKind, MapData}, options::*};
+//! use meshmark_detection::{Demodulator, Mark, Matched, Reference, decision::*, registration::*};
+//! # fn main() -> Result<(), meshmark_core::Error> {
+//! // 400 houses of four corners, 20 m apart; the last corner of a ring is the first one.
+//! let corner = |i: usize| [[0, 0], [9, 0], [9, 7], [0, 7], [0, 0]][i % 5].map(|metres| metres as f64);
+//! let house = |i: usize| [(i / 5 % 20 * 20 + i / 5 % 7) as f64, (i / 100 * 20 + i / 5 % 3) as f64];
+//! let coords = (0..2000).map(|i| [corner(i)[0] + house(i)[0], corner(i)[1] + house(i)[1]]).collect();
+//! let starts: Vec<u32> = (0..2000).step_by(5).collect();
+//! let (town, _) = MapData::from_chains(coords, &starts, vec![ChainKind::Shell; 400])?;
+//! let map = town.on(Ground::Plane { metres_per_unit: 1.0 }, None);
+//!
+//! let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::default());
+//! let recipient = Subject::Recipient("ACME GmbH".into());
+//! let copy = embedding::embed(&map, &key, &recipient.carried(&key), &parameters)?;
+//! let suspect = town.moved::<meshmark_core::Error>(|_| Ok(copy.coords.iter().map(|p| [p[0] + 0.4, p[1]]).collect()))?;
+//!
+//! let reference = Reference::new(&town, &map, 128, &parameters)?;
+//! let registration = Registrar::new(&town, &reference.ground, 1.0).register(&suspect, Start::Auto);
+//! let matched = Matched::new(&reference, &suspect, &registration, 1.0);
+//! let mark = Mark { key: &key, bits: 128, parameters: &parameters };
+//! let found = matched.demodulate(mark, Demodulator::Joint, 1.0, &|_| ())?.found;
+//! let decision = decide_among(&found, &Expected::new(&recipient, &key), 1, 1e-6);
+//! assert_eq!(decision.verdict, Verdict::Match);
+//! # Ok(()) }
 //! ```
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

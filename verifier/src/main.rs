@@ -5,5 +5,5 @@ mod cli;
 mod package_files;
 
 fn main() -> std::process::ExitCode {
-    std::process::ExitCode::from(cli::run() as u8)
+    std::process::ExitCode::from(cli::run())
 }

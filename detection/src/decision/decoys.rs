@@ -46,7 +46,7 @@ impl Decoys {
             mean,
             standard_deviation: variance.sqrt(),
             largest: scores.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            histogram: Histogram::of(&scores, BINS)?,
+            histogram: Histogram::of_values(&scores, BINS)?,
             tested: None,
         })
     }

@@ -33,7 +33,7 @@ impl Graph {
         Graph { starts, neighbours }
     }
 
-    fn of(&self, vertex: u32) -> &[u32] {
+    fn neighbours(&self, vertex: u32) -> &[u32] {
         let v = vertex as usize;
         &self.neighbours[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
@@ -66,9 +66,9 @@ pub fn choose(nearest: Matches, candidates: &[Candidate], reference: &Graph, sus
     let mut matches = nearest;
     for _ in 0..ROUNDS {
         let support = |c: &Candidate| {
-            let there = suspect.of(c.suspect);
+            let there = suspect.neighbours(c.suspect);
             let matched = |r: &&u32| matches.suspect_of[**r as usize].is_some_and(|s| there.contains(&s));
-            reference.of(c.reference).iter().filter(matched).count()
+            reference.neighbours(c.reference).iter().filter(matched).count()
         };
         let score = |c: &Candidate| NEIGHBOUR * support(c) as f64 - c.distance_m.powi(2) / (2.0 * spread2);
         let mut scored: Vec<(f64, Candidate)> = candidates.par_iter().map(|c| (score(c), *c)).collect();

@@ -9,7 +9,7 @@ use clap::{CommandFactory, Parser};
 use meshmark_core::{counted, key::SecretKey, options::Options};
 use meshmark_verifier::{
     Error, ExitCode, Result,
-    compare::{Comparison, compare, detail::Compared},
+    compare::{Comparison, compare, detail::ComparedFiles},
     distribute, html,
     inputs::{digests::Inputs, gdal_failures, texts},
     progress::Progress,
@@ -23,19 +23,22 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Runs the command of this process.
-pub fn run() -> ExitCode {
+/// The exit code of a command that did what it was asked for, and that of a match.
+const DONE: u8 = 0;
+
+/// Runs the command of this process; its exit code.
+pub fn run() -> u8 {
     gdal_failures::quieten_gdal();
     let result = match Cli::parse().command {
-        Subcommands::Keygen { key_file } => keygen(&key_file),
-        Subcommands::Verify(args) => run_verify(*args),
-        Subcommands::Compare(args) => run_compare(&args),
-        Subcommands::PackageFiles { folder } => write_package_files(&folder),
-        Subcommands::Distribute(args) => run_distribute(*args),
+        Subcommands::Keygen { key_file } => keygen(&key_file).map(|()| DONE),
+        Subcommands::Verify(args) => run_verify(*args).map(|code| code as u8),
+        Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
+        Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
+        Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),
     };
     result.unwrap_or_else(|error| {
         warn(&error.to_string());
-        error.exit_code()
+        error.exit_code() as u8
     })
 }
 
@@ -53,7 +56,7 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-fn keygen(path: &PathBuf) -> Result<ExitCode> {
+fn keygen(path: &PathBuf) -> Result<()> {
     let mut secret = zeroize::Zeroizing::new([0; 32]);
     getrandom::fill(secret.as_mut_slice()).map_err(|error| Error::Random { reason: error.to_string() })?;
     let key = SecretKey::from_bytes(*secret);
@@ -75,22 +78,24 @@ fn keygen(path: &PathBuf) -> Result<ExitCode> {
         return Err(failed(error));
     }
     print(&format!("key {} written to {}\n", key.id(), path.display()))?;
-    Ok(ExitCode::Match)
+    Ok(())
 }
 
-fn write_package_files(folder: &Path) -> Result<ExitCode> {
+fn write_package_files(folder: &Path) -> Result<()> {
     package_files::write(Cli::command(), folder).map_err(|source| {
         let what = format!("the folder {} for man pages and completions", folder.display());
         Error::Unwritten { what, source, remedy: "" }
     })?;
-    Ok(ExitCode::Match)
+    Ok(())
 }
 
-fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
+fn run_compare(args: &CompareArgs) -> Result<()> {
     let layers = Options::parse(args.layers.as_deref().map(|layers| ("LAYERS", layers)))?.layers;
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
-    let provenance =
-        file.as_ref().map(|_| Compared::read(&args.reference, &args.marked, command_line())).transpose()?;
+    let provenance = file
+        .as_ref()
+        .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line()))
+        .transpose()?;
     let mut comparison =
         compare(&args.reference, &args.marked, layers.as_deref(), args.precision, file.is_some())?;
     let detail = comparison.detail.take(); // a report file has it
@@ -103,12 +108,12 @@ fn run_compare(args: &CompareArgs) -> Result<ExitCode> {
             Format::Json => comparison.to_json(),
         })?;
     }
-    Ok(ExitCode::Match)
+    Ok(())
 }
 
-fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
+fn run_distribute(args: DistributeArgs) -> Result<()> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
-    let request = distribute::Request {
+    let request = distribute::DistributeRequest {
         options: Options::parse(flags)?,
         key: texts::key(&args.key)?,
         map: args.map,
@@ -122,7 +127,7 @@ fn run_distribute(args: DistributeArgs) -> Result<ExitCode> {
         count => format!(", {} there already", counted(count, "copy")),
     };
     print(&format!("{} written to {}{before}\n", counted(done.written, "copy"), request.folder.display()))?;
-    Ok(ExitCode::Match)
+    Ok(())
 }
 
 fn run_verify(args: VerifyArgs) -> Result<ExitCode> {

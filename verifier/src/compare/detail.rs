@@ -21,7 +21,7 @@ const MOST_PLACES: usize = 2000;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Detail {
     /// The files; null until they are given.
-    pub provenance: Option<Compared>,
+    pub provenance: Option<ComparedFiles>,
     /// Where the reference is.
     pub extent: Extent,
     /// How far vertices are from where they were, metres; null without vertices.
@@ -56,7 +56,7 @@ pub struct Topology {
 
 /// The files of a comparison, and how to compare them again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Compared {
+pub struct ComparedFiles {
     /// The reference.
     pub reference: Digested,
     /// The marked map.
@@ -67,14 +67,14 @@ pub struct Compared {
     pub versions: Vec<String>,
 }
 
-impl Compared {
+impl ComparedFiles {
     /// Digests the files.
     ///
     /// # Errors
     /// One of them cannot be read to its end.
     pub fn read(reference: &Path, marked: &Path, command: String) -> Result<Self> {
         let versions = crate::report::versions();
-        Ok(Compared { reference: digest(reference)?, marked: digest(marked)?, command, versions })
+        Ok(ComparedFiles { reference: digest(reference)?, marked: digest(marked)?, command, versions })
     }
 }
 
@@ -91,7 +91,7 @@ pub(super) struct Findings<'a> {
 
 impl Findings<'_> {
     pub fn detail(self) -> Detail {
-        let (coords, extent) = (self.vertices.coords(), Extent::of(self.vertices, &self.measure.ground));
+        let (coords, extent) = (self.vertices.coords(), Extent::new(self.vertices, &self.measure.ground));
         let pairs = coords.iter().zip(self.moved);
         let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.measure.metres_between(*a, *b)).collect();
         let lengths: Vec<f64> = displacements.iter().map(|[x, y]| x.hypot(*y)).collect();
@@ -106,8 +106,8 @@ impl Findings<'_> {
         Detail {
             provenance: None,
             extent,
-            displacement_m: Histogram::of(&lengths, BINS),
-            angle_change_deg: Histogram::of(&changes, BINS),
+            displacement_m: Histogram::of_values(&lengths, BINS),
+            angle_change_deg: Histogram::of_values(&changes, BINS),
             moved: shown.map(|(at, d)| [at[0], at[1], d[0], d[1]]).collect(),
             angle_cells: cells(&grid, self.corners),
             cell: grid.cell(),

@@ -30,7 +30,7 @@ pub struct Comparison {
     /// Version of this format.
     pub meshmark_comparison: u32,
     /// How much was compared.
-    pub compared: Compared,
+    pub compared: Counts,
     /// How far vertices are from where they were.
     pub displacement: Displacement,
     /// How far features are from where they were, as sets of points.
@@ -51,7 +51,7 @@ pub struct Comparison {
 
 /// Counts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Compared {
+pub struct Counts {
     /// Geometries.
     pub features: usize,
     /// Distinct vertices of the reference.
@@ -155,7 +155,7 @@ impl Pairs<'_> {
         });
         Comparison {
             meshmark_comparison: 1,
-            compared: Compared {
+            compared: Counts {
                 features: self.features.len(),
                 vertices: vertices.len(),
                 torn_vertices: torn.into_iter().filter(|torn| *torn).count(),

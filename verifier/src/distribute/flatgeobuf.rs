@@ -35,7 +35,7 @@ const NOTHING: Bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::N
 /// Writes a copy of `plain` in which the vertices are where they go.
 pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
     let mut bytes = fs::read(plain).map_err(|error| file_error("reading", plain, error))?;
-    let parts = Parts::of(&bytes).ok_or(Error::UnknownFlatGeobuf)?;
+    let parts = Parts::parse(&bytes).ok_or(Error::UnknownFlatGeobuf)?;
     let mut places = Vec::new();
     let mut at = parts.features.start;
     while at < parts.features.end {
@@ -88,7 +88,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn of(bytes: &[u8]) -> Option<Self> {
+    fn parse(bytes: &[u8]) -> Option<Self> {
         bytes.starts_with(MAGIC).then_some(())?;
         let header = root(bytes, HEADER)?;
         let index = HEADER + 4 + u32_at(bytes, HEADER)? as usize;

@@ -21,7 +21,7 @@ mod staged;
 mod staging;
 mod writing;
 
-pub use request::Request;
+pub use request::DistributeRequest;
 
 use crate::{Error, Result, inputs::maps, progress::Progress};
 use copies::MarkedCopy;
@@ -55,8 +55,12 @@ pub struct Summary {
 
 /// Writes a marked copy and its record for every recipient who has none yet. `warn` hears of what is legal and
 /// probably not meant.
-pub fn distribute(request: &Request, progress: &mut Progress, warn: &mut dyn FnMut(&str)) -> Result<Summary> {
-    let Request { key, options, folder, .. } = request;
+pub fn distribute(
+    request: &DistributeRequest,
+    progress: &mut Progress,
+    warn: &mut dyn FnMut(&str),
+) -> Result<Summary> {
+    let DistributeRequest { key, options, folder, .. } = request;
     let format = Format::find(Some(&request.format), Path::new("")).map_err(Error::from)?;
     let recipients = recipients::read(&request.recipients, warn)?;
     let made = make_folder(folder)?;
@@ -95,14 +99,14 @@ fn make_folder(folder: &Path) -> Result<bool> {
 
 /// Marks and writes, batch by batch.
 fn run(
-    request: &Request,
+    request: &DistributeRequest,
     survey: &Survey,
     (format, stage): (&'static Format, &Stage),
     copies: &[MarkedCopy],
     progress: &mut Progress,
     warn: &mut dyn FnMut(&str),
 ) -> Result<()> {
-    let Request { key, options, folder, .. } = request;
+    let DistributeRequest { key, options, folder, .. } = request;
     let of_map = |error| maps::failed("map", &request.map, error);
     let map = survey.map().map_err(of_map)?;
     let parameters = &options.parameters;

@@ -4,7 +4,7 @@ use meshmark_core::{key::SecretKey, options::Options};
 use std::path::PathBuf;
 
 /// What to distribute, to whom, and how it is marked.
-pub struct Request {
+pub struct DistributeRequest {
     /// The key.
     pub key: SecretKey,
     /// The marking options, without a subject.

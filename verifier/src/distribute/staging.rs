@@ -1,6 +1,6 @@
 //! What all copies are made of: the map as `ogr2ogr` copies it, and a GeoPackage whose geometries move.
 
-use super::{ogr2ogr, plain::Plain, request::Request, staged::Staged};
+use super::{ogr2ogr, plain::Plain, request::DistributeRequest, staged::Staged};
 use crate::{Error, Result, inputs::maps};
 use gdal::{
     Dataset, DriverManager,
@@ -22,7 +22,7 @@ pub struct Stage {
 impl Stage {
     /// Copies the map; `warn` hears what `ogr2ogr` warns of.
     pub fn new(
-        request: &Request,
+        request: &DistributeRequest,
         format: &'static Format,
         (dataset, map): (&Dataset, &Survey),
         workplace: &Workplace,
@@ -57,7 +57,12 @@ impl Stage {
 }
 
 /// Refuses what the format would hold otherwise.
-fn check_fits(request: &Request, format: &'static Format, map: &Survey, layers: &[String]) -> Result<()> {
+fn check_fits(
+    request: &DistributeRequest,
+    format: &'static Format,
+    map: &Survey,
+    layers: &[String],
+) -> Result<()> {
     let driver = format.driver;
     let refused = |error: MapError| Err(Error::Refused { path: request.map.clone(), source: error });
     if layers.len() > 1 && !format.many_layers {

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::compare::{
     Comparison,
-    detail::{Compared, Detail, NOTABLE_DEG, Topology},
+    detail::{ComparedFiles, Detail, NOTABLE_DEG, Topology},
 };
 use maud::{Markup, html};
 use meshmark_detection::Histogram;
@@ -54,7 +54,7 @@ fn is_kept(comparison: &Comparison) -> bool {
         == 0
 }
 
-fn sentence(comparison: &Comparison, provenance: Option<&Compared>) -> Markup {
+fn sentence(comparison: &Comparison, provenance: Option<&ComparedFiles>) -> Markup {
     let d = &comparison.displacement;
     html! {
         @match provenance {
@@ -102,7 +102,7 @@ fn percent(share: f64, decimals: usize) -> String {
     format!("{:.decimals$}\u{a0}%", 100.0 * share)
 }
 
-fn files(provenance: &Compared) -> Markup {
+fn files(provenance: &ComparedFiles) -> Markup {
     let file = |file: &crate::inputs::digests::Digested| {
         Some(html! { b { (file.path) } br; span.digest { (file.digest) } })
     };
@@ -246,7 +246,7 @@ const KINDS: [Kind; 4] = [
 ];
 
 fn moved(detail: &Detail, frame: &Frame) -> Markup {
-    let arrows = Arrows::of(frame, detail.moved.iter().map(|v| [v[2], v[3]]));
+    let arrows = Arrows::fitting(frame, detail.moved.iter().map(|v| [v[2], v[3]]));
     let drawing = html! {
         svg.map.vertices viewBox=(frame.view_box()) role="img" aria-label="Map of displacements" {
             use href="#lines" {}
@@ -274,7 +274,7 @@ fn charts(detail: &Detail) -> Markup {
     }
 }
 
-fn repeat(provenance: &Compared) -> Markup {
+fn repeat(provenance: &ComparedFiles) -> Markup {
     html! {
         p { "With the files above in their places:" }
         pre { code { (provenance.command) } }

@@ -125,7 +125,7 @@ fn middle(place: &PatchPlace) -> [f64; 2] {
 
 fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     let (sketch, sample) = (&evidence.sketch, &evidence.sketch.sample);
-    let arrows = Arrows::of(frame, sample.matched.iter().map(|v| [v[2], v[3]]));
+    let arrows = Arrows::fitting(frame, sample.matched.iter().map(|v| [v[2], v[3]]));
     let drawing = html! {
         svg.map.vertices viewBox=(frame.view_box()) role="img" aria-label="Map of matched, missing and inserted vertices" {
             use href="#lines" {}
@@ -172,7 +172,7 @@ pub struct Arrows {
 const ORDINARY: f64 = 75.0;
 
 impl Arrows {
-    pub fn of(frame: &Frame, displacements_m: impl Iterator<Item = [f64; 2]>) -> Self {
+    pub fn fitting(frame: &Frame, displacements_m: impl Iterator<Item = [f64; 2]>) -> Self {
         let (sum, n) = displacements_m.fold((0.0, 0), |(sum, n), [x, y]| (sum + x * x + y * y, n + 1));
         let rms_m = (sum / f64::from(n.max(1))).sqrt();
         let length = frame.length(rms_m);

@@ -15,7 +15,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    pub(crate) fn of(vertices: &VertexTable, ground: &Ground) -> Self {
+    pub(crate) fn new(vertices: &VertexTable, ground: &Ground) -> Self {
         let (lower, upper) = vertices.bounds();
         Extent { lower, upper, metres_per_unit: ground.metres_per_unit(vertices.centre()) }
     }

@@ -99,7 +99,7 @@ impl Scene<'_> {
     pub fn sketch(&self, registration: &Registration) -> Sketch {
         let reference = self.matched.reference;
         let coords = self.coords();
-        let extent = Extent::of(&reference.data.vertices, &reference.ground);
+        let extent = Extent::new(&reference.data.vertices, &reference.ground);
         let displacements = self.matches.displacements_m(coords, &self.matched.moved, &reference.ground);
         let deformation = self.demodulated.and_then(|demodulated| demodulated.deformation);
         let lengths: Vec<f64> = displacements.iter().flatten().map(|[x, y]| x.hypot(*y)).collect();
@@ -107,7 +107,7 @@ impl Scene<'_> {
         Sketch {
             extent,
             patches: reference.patches.as_slice().iter().map(|patch| self.place(patch)).collect(),
-            displacement_m: Histogram::of(&lengths, BINS),
+            displacement_m: Histogram::of_values(&lengths, BINS),
             alignment: self.alignment(registration),
             deformation: deformation
                 .map(|d| DeformationEntry { deviation_m: d.deviation_m, range_m: d.range_m }),
