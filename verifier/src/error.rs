@@ -18,11 +18,11 @@ pub enum Error {
     #[error("{}", .0.text(Spelling::Flag))]
     Dataset(#[from] MapError),
     #[error("the {what} {}: {}", path.display(), source.text(Spelling::Flag))]
-    Map { what: &'static str, path: PathBuf, source: MapError },
+    Map { what: &'static str, path: PathBuf, source: Box<MapError> },
     #[error("the reference {}: {}", path.display(), source.text(Spelling::Flag))]
-    Unfit { path: PathBuf, source: MapError },
+    Unfit { path: PathBuf, source: Box<MapError> },
     #[error("the map {}: {}", path.display(), source.text(Spelling::Flag))]
-    Refused { path: PathBuf, source: MapError },
+    Refused { path: PathBuf, source: Box<MapError> },
     #[error("{}: {source}", path.display())]
     Malformed { path: PathBuf, source: meshmark_core::Error },
     #[error("the {what} {} cannot be read: {source}", path.display())]
@@ -99,7 +99,7 @@ pub enum Error {
     #[error("the {what} {} cannot be opened: {reason}{formats}", path.display())]
     Unopened { what: &'static str, path: PathBuf, reason: String, formats: String },
     #[error("the {what} {}: {source}", path.display())]
-    Unmeasured { what: &'static str, path: PathBuf, source: MapError },
+    Unmeasured { what: &'static str, path: PathBuf, source: Box<MapError> },
     #[error("{} cannot be read to its end: {source}", path.display())]
     Undigested { path: PathBuf, source: io::Error },
     #[error("the suspect {} is not a file here: give a local file", path.display())]

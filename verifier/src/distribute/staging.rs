@@ -64,7 +64,8 @@ fn check_fits(
     layers: &[String],
 ) -> Result<()> {
     let driver = format.driver;
-    let refused = |error: MapError| Err(Error::Refused { path: request.map.clone(), source: error });
+    let refused =
+        |error: MapError| Err(Error::Refused { path: request.map.clone(), source: Box::new(error) });
     if layers.len() > 1 && !format.many_layers {
         return refused(MapError::OneLayer { driver });
     }

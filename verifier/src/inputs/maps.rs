@@ -58,7 +58,7 @@ pub fn geometries(
     forget_failure();
     let found = features(&dataset, layers, &last_failure);
     Ok((
-        found.map_err(|error| Error::Unmeasured { what: what, path: path.into(), source: error })?,
+        found.map_err(|error| Error::Unmeasured { what, path: path.into(), source: Box::new(error) })?,
         first_crs(&dataset),
     ))
 }
@@ -74,7 +74,7 @@ pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<
     survey.into_scales().map_err(|error| Error::Unmeasured {
         what: "reference",
         path: path.into(),
-        source: error,
+        source: Box::new(error),
     })
 }
 
@@ -149,5 +149,5 @@ pub(super) fn survey_of(
 }
 
 pub(crate) fn failed(what: &'static str, path: &Path, source: meshmark_dataset::Error) -> Error {
-    Error::Map { what, path: path.into(), source }
+    Error::Map { what, path: path.into(), source: Box::new(source) }
 }

@@ -85,7 +85,9 @@ impl<T> Fit<T> {
 /// # Errors
 /// An unreadable suspect.
 pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Fit<Examination>> {
-    let unfit = |source: MapError| Fit::Unfit(Error::Unfit { path: request.reference.clone(), source });
+    let unfit = |source: MapError| {
+        Fit::Unfit(Error::Unfit { path: request.reference.clone(), source: Box::new(source) })
+    };
     let map = match reference.map() {
         Ok(map) => map,
         Err(error) => return Ok(unfit(error)),
