@@ -6,7 +6,10 @@ use super::{
 };
 use crate::{
     Error, ExitCode, Result,
-    inputs::{maps, maps::Reading, suspects},
+    inputs::{
+        maps::{self, Reading},
+        suspects::{self, Suspect},
+    },
     progress::Progress,
     report::{
         EvidenceMap, VertexCounts,
@@ -14,7 +17,7 @@ use crate::{
     },
 };
 use meshmark_core::demodulation::Demodulation;
-use meshmark_dataset::{Error as MapError, LabelFields, Survey};
+use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Reference,
     decision::Decoys,
@@ -85,69 +88,95 @@ impl<T> Fit<T> {
 /// # Errors
 /// An unreadable suspect.
 pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Fit<Examination>> {
-    let unfit = |source: MapError| {
-        Fit::Unfit(Error::Unfit { path: request.reference.clone(), source: Box::new(source) })
-    };
+    let unfit =
+        |source| Fit::Unfit(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
     let map = match reference.map() {
         Ok(map) => map,
         Err(error) => return Ok(unfit(error)),
     };
-    progress.start("reading", 0);
-    let plain = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
-    let suspect = suspects::suspect(&request.suspect, &plain, reference)?;
+    let suspect = read_suspect(request, reference, progress)?;
     let suspect_crs = suspect.layer_crs.clone();
-
     progress.start("patches", 0);
-    let compared = Reference::new(&reference.data, &map, request.bits, &request.parameters);
-    let compared = match compared {
+    let compared = match Reference::new(&reference.data, &map, request.bits, &request.parameters) {
         Ok(compared) => compared,
         Err(error) => return Ok(unfit(error.into())), // before the map is searched for
     };
-
-    progress.start("registration", 0);
-    let registrar = Registrar::new(&reference.data, &compared.ground, request.radius_m);
-    let file = (request.suspect.as_path(), &plain);
     let Registered { map: suspect, registration } =
-        crs_search::register(&registrar, reference, suspect, file, request.registration)?;
-
+        register(request, (reference, &compared), suspect, progress)?;
     progress.start("matching", 0);
     let matched = Matched::new(&compared, &suspect.data, &registration, request.radius_m);
-    let mark = (request.mark(), request.demodulator);
-    let demodulated = match matched.is_chance() {
-        true => None,
-        false => {
-            let found =
-                progress.listen(|listener| matched.demodulate(mark.0, mark.1, request.radius_m, listener));
-            match found {
-                Ok(found) => Some(found),
-                Err(error) => return Ok(unfit(error.into())),
-            }
-        }
+    let demodulated = match demodulate(request, &matched, progress) {
+        Ok(demodulated) => demodulated,
+        Err(error) => return Ok(unfit(error.into())),
     };
+    let crs = reference.crs.as_ref();
+    Ok(Fit::Fits(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
+}
+
+/// How a suspect is read: whole, and with all its attributes.
+const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
+
+fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
+    progress.start("reading", 0);
+    suspects::suspect(&request.suspect, &WHOLE, reference)
+}
+
+fn register(
+    request: &Request,
+    (reference, compared): (&Survey, &Reference),
+    suspect: Suspect,
+    progress: &mut Progress,
+) -> Result<Registered> {
+    progress.start("registration", 0);
+    let registrar = Registrar::new(&reference.data, &compared.ground, request.radius_m);
+    let file = (request.suspect.as_path(), &WHOLE);
+    crs_search::register(&registrar, reference, suspect, file, request.registration)
+}
+
+/// Demodulates what matches; nothing where that is chance.
+fn demodulate(
+    request: &Request,
+    matched: &Matched,
+    progress: &mut Progress,
+) -> meshmark_core::Result<Option<Demodulated>> {
+    if matched.is_chance() {
+        return Ok(None);
+    }
+    let (mark, radius_m) = (request.mark(), request.radius_m);
+    let found =
+        progress.listen(|listener| matched.demodulate(mark, request.demodulator, radius_m, listener))?;
+    Ok(Some(found))
+}
+
+/// What the suspect shows. `crs` is that of the reference.
+fn seen(
+    request: &Request,
+    (matched, demodulated): (&Matched, Option<Demodulated>),
+    registration: Registration,
+    crs: Option<&CoordinateSystem>,
+) -> Examination {
     let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
-    let vertices = VertexCounts {
-        reference: reference.data.vertices.len(),
-        suspect: suspect.data.vertices.len(),
-        matched: matches.count,
-    };
-    let scene = Scene { matched: &matched, matches, demodulated: demodulated.as_ref() };
+    let reference = &matched.reference.data.vertices;
+    let suspect = matched.suspect.vertices.len();
+    let vertices = VertexCounts { reference: reference.len(), suspect, matched: matches.count };
+    let scene = Scene { matched, matches, demodulated: demodulated.as_ref() };
     let sketch = request.sketch.then(|| scene.sketch(&registration));
-    let evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene, reference.crs.as_ref()));
+    let evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene, crs));
     let (found, decoys) = match demodulated {
         Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),
         None => (Err(unregistered(&vertices, matched.by_chance, request.registration)), None),
     };
-    Ok(Fit::Fits(Examination {
+    Examination {
         registration,
         vertices,
-        reference_digest: reference.data.vertices.digest(),
-        crs: reference.crs.as_ref().map(|crs| crs.brief_name()),
-        suspect_crs,
+        reference_digest: reference.digest(),
+        crs: crs.map(|crs| crs.brief_name()),
+        suspect_crs: Vec::new(),
         found,
         decoys,
         sketch,
         evidence_map,
-    }))
+    }
 }
 
 fn unregistered(vertices: &VertexCounts, chance: usize, start: Start) -> String {
