@@ -1,18 +1,19 @@
-//! What marking and verifying cost: prints a Markdown table with a column for every map and tiling, and writes
-//! it with JSON and plots. `meshmark` and the driver are those next to this program; GDAL_DRIVER_PATH names
-//! another driver.
+//! What marking and verifying cost, beside plain `ogr2ogr` and a numpy script, from thousands of vertices to millions:
+//! prints a Markdown table with a column for every map and tiling, and writes it with JSON and plots. `meshmark` and the
+//! driver are those next to this program; GDAL_DRIVER_PATH names another driver.
+//!
+//! Processes run as a user runs them, in turns; stages are timed in this process. Nothing is asserted, for times depend
+//! on the machine and on what else it does.
+
+mod job;
+mod report;
+mod stages;
+mod startup;
 
 use clap::Parser;
-use meshmark_host_tests::{
-    attacks::Map,
-    bench::{
-        Result,
-        job::{Jobs, Programs},
-        report,
-        startup::load_ms,
-        tiling::tile,
-    },
-};
+use job::{Jobs, Programs};
+use meshmark_host_tests::{Result, attacks::Map, tiling::tile};
+use startup::load_ms;
 use std::{
     fs,
     path::{Path, PathBuf},

@@ -1,7 +1,6 @@
 //! The product as its users have it: the driver inside `ogr2ogr`, and the command `meshmark`.
 
-use super::Result;
-use crate::attacks::Random;
+use crate::{Result, attacks::Random};
 use meshmark_core::key::SecretKey;
 use serde::{Deserialize, Serialize};
 use std::{

@@ -1,11 +1,11 @@
 //! Whole jobs on one map: plain `ogr2ogr`, the same through the driver, the numpy script, verification.
 
-use super::{
+use crate::stages::Stages;
+use meshmark_core::key::SecretKey;
+use meshmark_host_tests::{
     Result,
     process::{Run, Runs},
-    stages::Stages,
 };
-use meshmark_core::key::SecretKey;
 use serde::Serialize;
 use serde_json::Value;
 use std::{
