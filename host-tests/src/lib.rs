@@ -8,6 +8,7 @@
 //! - [`faults`]: killed writers and full disks; [`vectors`]: the test vectors
 
 pub mod attacks;
+mod built;
 pub mod contents;
 pub mod experiment;
 pub mod faults;

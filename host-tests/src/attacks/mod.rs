@@ -123,12 +123,13 @@ impl Attack {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::plugin;
     use gdal::vector::{FieldValue, Geometry, OGRFieldType, OGRwkbGeometryType, ToGdal};
-    use std::{collections::HashMap, path::Path};
+    use std::collections::HashMap;
 
     /// One of the repository's small maps.
     pub fn fixture(name: &str) -> Map {
-        Map::read(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")).join(name)).unwrap()
+        Map::read(&plugin::fixture(name)).unwrap()
     }
 
     /// A map of one layer with these geometries, named a, b, …

@@ -348,6 +348,7 @@ fn seed_of(seed: u64, map: &str, case: &str) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plugin::fixture;
     use std::collections::BTreeSet;
 
     #[test]
@@ -360,7 +361,6 @@ mod tests {
 
     #[test]
     fn a_map_in_degrees_is_refused() {
-        let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/europe_deg.gpkg"));
-        assert!(check_metres(fixture).unwrap_err().to_string().contains("not in metres"));
+        assert!(check_metres(&fixture("europe_deg.gpkg")).unwrap_err().to_string().contains("not in metres"));
     }
 }
