@@ -28,20 +28,22 @@ build: deps
 	mkdir -p $(PLUGINS)
 	install -m 755 $(BUILD)/libmeshmark_plugin.so $(PLUGIN)
 
+# The tests of driver and command compile neither plots nor benchmarks; those of the studies follow.
 test: build
-	$(WITH_GDAL) $(CARGO) test --release --locked --workspace
+	$(WITH_GDAL) $(CARGO) test --release --locked
+	$(WITH_GDAL) $(CARGO) test --release --locked -p meshmark-studies
 
 demo: build
 	GDAL_DRIVER_PATH=$(CURDIR)/$(PLUGINS) ./demo.sh $(BUILD)/meshmark fixtures/helsinki.gpkg
 
 # About half an hour for the maps of docs/performance.md.
 bench: build $(BENCH_PYTHON)
-	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
-	$(BUILD)/bench --out target/bench --tiles $(BENCH_TILES) --script $(BENCH_PYTHON) host-tests/peers/mesh_spectral.py \
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-benches
+	$(BUILD)/bench --out target/bench --tiles $(BENCH_TILES) --script $(BENCH_PYTHON) benches/peers/mesh_spectral.py \
 		$(or $(MAPS),$(BENCH_MAPS),$(FIXTURES))
-	$(WITH_GDAL) $(CARGO) bench --locked -p meshmark-host-tests --bench kernels
+	$(WITH_GDAL) $(CARGO) bench --locked -p meshmark-benches --bench kernels
 
-$(BENCH_PYTHON): host-tests/peers/requirements.txt
+$(BENCH_PYTHON): benches/peers/requirements.txt
 	./install-deps.sh python3-venv libopenblas-dev
 	python3 -m venv target/bench-python
 	$(BENCH_PYTHON) -m pip install --quiet -r $<
@@ -49,17 +51,17 @@ $(BENCH_PYTHON): host-tests/peers/requirements.txt
 
 # The paper's Table 2 and more, on maps in metres; about an hour for the nine maps of docs/evaluation.md.
 table2: build
-	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin table2
 	$(BUILD)/table2 --out target/table2 $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # What marking does to shape and topology, with every SHAPE and BASIS; fails when anything became invalid.
 quality: build
-	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin quality
 	$(BUILD)/quality $(or $(MAPS),$(wildcard ../shared/maps/dev/*.gpkg ../shared/maps/variety/*.gpkg),$(FIXTURES))
 
 # p-values of wrong keys and wrong recipients.
 false-alarms: build
-	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bins
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms
 	$(BUILD)/false_alarms --out target/false_alarms $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # Kills and full disks while marked maps are written, more of them than in the tests.

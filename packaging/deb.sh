@@ -30,7 +30,7 @@ install -D -m 644 "$work/generated/meshmark.fish" "$tree/usr/share/fish/vendor_c
 documents=$tree/usr/share/doc/meshmark
 install -d "$documents"
 (cd "$root" && cp -r --parents {README,ARCHITECTURE,CHANGELOG}.md docs examples fixtures/{SOURCES.md,vectors,kotka.gpkg,helsinki.gpkg} \
-    plugin/include/meshmark.h host-tests/peers/mesh_spectral.py "$documents")
+    plugin/include/meshmark.h benches/peers/mesh_spectral.py "$documents")
 gzip -9n <"$root/CHANGELOG.md" >"$documents/changelog.gz"
 gzip -9n >"$documents/changelog.Debian.gz" <<END
 meshmark ($version) unstable; urgency=medium

@@ -6,7 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 folder=$root/target/gdal-3.12
 gdal=$folder/gdal
 wheel=$root/target/wheel/python/bin/python
-crates=(-p meshmark-dataset -p meshmark-plugin -p meshmark-verifier -p meshmark-host-tests)
+crates=(-p meshmark-dataset -p meshmark-plugin -p meshmark-verifier -p meshmark-host-tests -p meshmark-cgal)
 
 # with_3_12 COMMAND...: what it starts, compiles and links are of GDAL 3.12.
 with_3_12() {

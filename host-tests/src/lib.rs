@@ -1,11 +1,22 @@
+//! What tests, studies and benchmarks share: the hosts that use the product, the product as its users have it, and what
+//! happens to maps.
+//!
+//! - [`plugin`]: GDAL's programs with the driver, in a folder of their own; [`contents`]: what a dataset holds
+//! - [`product`]: a build of driver and command; [`process`]: a program with its time and memory
+//! - [`attacks`]: from a map to a map; [`tiling`]: larger maps
+//! - [`experiment`]: maps are marked, copies attacked, suspects verified
+//! - [`faults`]: killed writers and full disks; [`vectors`]: the test vectors
+
 pub mod attacks;
-pub mod bench;
-pub mod cgal;
+mod built;
 pub mod contents;
-pub mod delaunay_check;
-pub mod false_alarms;
+pub mod experiment;
 pub mod faults;
-pub mod plot;
 pub mod plugin;
-pub mod table2;
+pub mod process;
+pub mod product;
+pub mod tiling;
 pub mod vectors;
+
+/// The result of an attack or an experiment; errors are sentences for the person who runs it.
+pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;

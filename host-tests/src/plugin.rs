@@ -1,51 +1,30 @@
 //! The driver as a user has it: GDAL's own programs, the plugin in a folder, a key file.
 
+use crate::built;
 use meshmark_core::key::SecretKey;
 use std::{
     fs,
     path::{Path, PathBuf},
     process::Command,
-    time::SystemTime,
 };
 use tempfile::TempDir;
 
-/// Folders whose files make the plugin.
-const SOURCES: [&str; 4] = ["core/src", "dataset/src", "plugin/src", "plugin/cpp"];
-
-/// The plugin that cargo built.
+/// The plugin that cargo built; the command `meshmark` is beside it.
 ///
 /// # Panics
-/// When it is not there, or older than its sources: a test must not pass on yesterday's plugin.
+/// When one of them is missing, or older than its sources.
 pub fn library() -> PathBuf {
-    let program = std::env::current_exe().expect("a program has a path");
-    let folder = program.parent().expect("a program is in a folder");
-    let folder = if folder.ends_with("deps") { folder.with_file_name("") } else { folder.into() }; // a test
+    let folder = built::folder().unwrap();
     let library = folder.join("libmeshmark_plugin.so");
-    let remedy = "run `make build` first";
-    let built = modified(&library).unwrap_or_else(|| panic!("{} is missing: {remedy}", library.display()));
-    for source in SOURCES {
-        let newest = newest(&workspace().join(source));
-        assert!(newest <= Some(built), "{} is older than {source}: {remedy}", library.display());
+    for (file, rule) in [(&library, "libmeshmark_plugin.d"), (&folder.join("meshmark"), "meshmark.d")] {
+        built::check(file, &folder.join(rule)).unwrap_or_else(|error| panic!("{error}"));
     }
     library
 }
 
 /// A fixture's path.
 pub fn fixture(name: &str) -> PathBuf {
-    workspace().join("fixtures").join(name)
-}
-
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a member of a workspace").into()
-}
-
-fn modified(path: &Path) -> Option<SystemTime> {
-    path.metadata().and_then(|metadata| metadata.modified()).ok()
-}
-
-fn newest(folder: &Path) -> Option<SystemTime> {
-    let files = fs::read_dir(folder).expect("a source folder").map(|entry| entry.expect("readable").path());
-    files.filter_map(|file| modified(&file)).max()
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")).join(name)
 }
 
 /// A folder of its own with the key `key.json`, in which GDAL's programs find the plugin.

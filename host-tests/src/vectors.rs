@@ -1,5 +1,6 @@
 //! The test vectors of fixtures/vectors: what `make_vectors` writes and tests/vectors.rs proves.
 
+use crate::plugin::fixture;
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::{
     carrier::{Carrier, bit_of_coefficient},
@@ -26,12 +27,12 @@ const FIRST: usize = 8;
 
 /// The folder of the test vectors.
 pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/vectors")
+    fixture("vectors")
 }
 
 /// The reference map.
 pub fn reference_path() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/kotka.gpkg")
+    fixture("kotka.gpkg")
 }
 
 /// The marked map.

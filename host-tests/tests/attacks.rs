@@ -2,10 +2,9 @@
 //!
 //! A few attacks on one map; the whole suite is the command `table2`.
 
-use meshmark_host_tests::table2::{
-    experiment::{Outcome, Plan, run},
+use meshmark_host_tests::{
+    experiment::{Outcome, Plan, bit_error_percent, is_match, run},
     product::{Product, Profile},
-    summary::{bit_error_percent, is_match},
 };
 use std::{path::Path, sync::OnceLock};
 

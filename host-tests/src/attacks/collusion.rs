@@ -1,6 +1,7 @@
 //! Collusion: recipients of differently marked copies of one map average them.
 
-use super::{Map, Result};
+use super::Map;
+use crate::Result;
 
 /// The mean of every coordinate over copies of one map.
 ///

@@ -1,6 +1,7 @@
 //! Cropping: a part of the map is cut out, with new vertices where the border cuts lines and areas.
 
-use super::{Map, Result};
+use super::Map;
+use crate::Result;
 use gdal::{
     cpl::CslStringList,
     vector::{self, OGRwkbGeometryType, ToGdal},

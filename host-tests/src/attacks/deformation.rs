@@ -1,6 +1,7 @@
 //! Local deformation: the cells of a grid are turned a little, neighbours to opposite sides.
 
-use super::{Map, Result};
+use super::Map;
+use crate::Result;
 
 /// The size of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]

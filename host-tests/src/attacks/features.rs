@@ -1,6 +1,7 @@
 //! Attacks on features: deletion, order, attributes, features of another map.
 
-use super::{Layer, Map, Result, random::Random, similarity};
+use super::{Layer, Map, random::Random, similarity};
+use crate::Result;
 
 /// Deletes a share of the features, chosen at random over all layers.
 pub fn delete(map: &Map, share: f64, seed: u64) -> Map {

@@ -1,6 +1,7 @@
 //! Round trips through the formats in which maps travel, by `ogr2ogr` as anyone would do it.
 
-use super::{Layer, Map, Result};
+use super::{Layer, Map};
+use crate::Result;
 use std::{path::Path, process::Command};
 
 /// An exchange format.

@@ -1,7 +1,7 @@
 //! A map in memory, which attacks take and give: layers, attributes and feature ids of any GDAL dataset,
 //! geometries in the plane (Z and M are left behind).
 
-use super::Result;
+use crate::Result;
 use gdal::{
     Dataset, DriverManager,
     spatial_ref::SpatialRef,

@@ -23,14 +23,12 @@ pub use map::{Feature, Field, Layer, Map};
 pub use random::Random;
 pub use rows::{Row, extended_rows, paper_rows};
 
+use crate::Result;
 use crop::Window;
 use deformation::{Cell, Side};
 use formats::Format;
 use similarity::{About, Matrix};
 use std::sync::Arc;
-
-/// The result of an attack: GDAL, PROJ or GEOS may fail.
-pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 /// An attack, all lengths in units of the map's CRS.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,12 +123,13 @@ impl Attack {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::plugin;
     use gdal::vector::{FieldValue, Geometry, OGRFieldType, OGRwkbGeometryType, ToGdal};
-    use std::{collections::HashMap, path::Path};
+    use std::collections::HashMap;
 
     /// One of the repository's small maps.
     pub fn fixture(name: &str) -> Map {
-        Map::read(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")).join(name)).unwrap()
+        Map::read(&plugin::fixture(name)).unwrap()
     }
 
     /// A map of one layer with these geometries, named a, b, …

@@ -1,6 +1,7 @@
 //! Noise and rounding.
 
-use super::{Map, Random, Result, random::PerVertex};
+use super::{Map, Random, random::PerVertex};
+use crate::Result;
 
 /// Adds a number that `draw` makes to either coordinate of every vertex, units of the CRS.
 ///

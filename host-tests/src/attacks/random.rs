@@ -1,6 +1,7 @@
 //! The random numbers of the attacks: ChaCha20 from a seed, so that an attack can be repeated.
 
-use super::{Map, Result};
+use super::Map;
+use crate::Result;
 use meshmark_core::vertices::VertexTable;
 use rand_chacha::{
     ChaCha20Rng,

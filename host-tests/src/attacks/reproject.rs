@@ -1,6 +1,7 @@
 //! Reprojection into another CRS.
 
-use super::{Map, Result};
+use super::Map;
+use crate::Result;
 use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
 use geo::{Coord, CoordsIter, MapCoords};
 use std::cell::Cell;

@@ -1,6 +1,7 @@
 //! Affine attacks on a whole map: translation, scaling, rotation, shear, mirroring.
 
-use super::{Map, Result};
+use super::Map;
+use crate::Result;
 
 /// Where an affine map has its fixed point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

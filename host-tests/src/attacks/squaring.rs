@@ -5,9 +5,10 @@
 //! corners want, so walls stay shared.
 
 use super::{
-    Map, Result,
+    Map,
     parts::{Part, visit},
 };
+use crate::Result;
 use geo::{Coord, Geometry};
 use meshmark_core::vertices::VertexTable;
 

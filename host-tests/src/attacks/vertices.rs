@@ -1,10 +1,11 @@
 //! Attacks on the number of vertices: insertion, densification, simplification, deletion.
 
 use super::{
-    Map, Result,
+    Map,
     parts::{Part, rewrite_map, visit},
     random::{PerVertex, Random},
 };
+use crate::Result;
 use geo::{Coord, Geometry, Simplify};
 use std::collections::{BTreeSet, HashMap};
 

@@ -1,13 +1,16 @@
 //! Marks maps, attacks the copies, verifies them, and compares the bit errors with the paper's Table 2.
 
 use clap::Parser;
-use meshmark_host_tests::table2::{
+use meshmark_host_tests::{
     Result,
-    cases::{Case, Table},
-    experiment::{Outcome, Plan, run},
-    figures, markdown,
+    experiment::{
+        Outcome, Plan,
+        cases::{Case, Table},
+        run,
+    },
     product::{Product, Profile},
 };
+use meshmark_studies::table2::{figures, markdown};
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,

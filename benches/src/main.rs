@@ -1,18 +1,19 @@
-//! What marking and verifying cost: prints a Markdown table with a column for every map and tiling, and writes
-//! it with JSON and plots. `meshmark` and the driver are those next to this program; GDAL_DRIVER_PATH names
-//! another driver.
+//! What marking and verifying cost, beside plain `ogr2ogr` and a numpy script, from thousands of vertices to millions:
+//! prints a Markdown table with a column for every map and tiling, and writes it with JSON and plots. `meshmark` and the
+//! driver are those next to this program.
+//!
+//! Processes run as a user runs them, in turns; stages are timed in this process. Nothing is asserted, for times depend
+//! on the machine and on what else it does.
+
+mod job;
+mod report;
+mod stages;
+mod startup;
 
 use clap::Parser;
-use meshmark_host_tests::{
-    attacks::Map,
-    bench::{
-        Result,
-        job::{Jobs, Programs},
-        report,
-        startup::load_ms,
-        tiling::tile,
-    },
-};
+use job::{Jobs, Programs};
+use meshmark_host_tests::{Result, attacks::Map, product::Product, tiling::tile};
+use startup::load_ms;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -40,7 +41,7 @@ fn main() -> Result<()> {
     gdal::config::set_error_handler(|_, _, _| ()); // warnings about a map are not what is measured
     fs::create_dir_all(&arguments.out)?;
     let programs = programs(arguments.script)?;
-    let load_ms = load_ms(&programs.plugins)?;
+    let load_ms = load_ms(programs.product.plugins())?;
     let mut all = Vec::new();
     for map in &arguments.maps {
         all.push(measure(&programs, map, Map::read(map)?.vertices()?.len())?);
@@ -74,16 +75,8 @@ fn measure(programs: &Programs, map: &Path, vertices: usize) -> Result<Jobs> {
 }
 
 fn programs(script: Option<Vec<PathBuf>>) -> Result<Programs> {
-    let here = std::env::current_exe()?.parent().ok_or("this program has no folder")?.to_path_buf();
-    let plugins = std::env::var_os("GDAL_DRIVER_PATH").map_or(here.join("gdalplugins"), PathBuf::from);
-    let meshmark = here.join("meshmark");
-    for needed in [&meshmark, &plugins] {
-        if !needed.exists() {
-            return Err(format!("{} is missing: run `make build` first", needed.display()).into());
-        }
-    }
     let script =
         script.map(|paths| paths.iter().map(std::path::absolute).collect::<std::io::Result<Vec<_>>>());
     let script = script.transpose()?.and_then(|paths| paths.try_into().ok());
-    Ok(Programs { meshmark, plugins, script })
+    Ok(Programs { product: Product::of_this_build()?, script })
 }

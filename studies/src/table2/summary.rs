@@ -1,6 +1,6 @@
 //! Averages over maps.
 
-use super::experiment::Outcome;
+use meshmark_host_tests::experiment::{Outcome, bit_error_percent, is_match};
 
 /// An attack, a chip rate and a demodulator over all maps.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -39,16 +39,6 @@ pub fn cell<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Option<Cell>
     })
 }
 
-/// The bit error rate of one suspect; `None` when it was not registered.
-pub fn bit_error_percent(outcome: &Outcome) -> Option<f64> {
-    Some(100.0 * outcome.bit_errors? as f64 / outcome.bits as f64)
-}
-
-/// Whether the verdict is that the mark is there.
-pub fn is_match(outcome: &Outcome) -> bool {
-    outcome.verdict.as_deref() == Some("match")
-}
-
 /// Distinct values in the order of their first occurrence.
 pub fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut distinct = Vec::new();
@@ -61,9 +51,45 @@ pub fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::table2::experiment::tests::outcome;
+    use meshmark_host_tests::{experiment::cases::Table, product::Profile};
+
+    /// An outcome on a map called "town"; `None` bit errors is a suspect that was not registered.
+    pub fn outcome(
+        id: &str,
+        chip_rate: usize,
+        demodulator: &'static str,
+        bit_errors: Option<usize>,
+    ) -> Outcome {
+        let verdict = if bit_errors.is_some_and(|errors| errors < 30) { "match" } else { "inconclusive" };
+        Outcome {
+            table: Table::Paper,
+            map: "town".into(),
+            profile: Profile::repetition(chip_rate),
+            case: id.into(),
+            title: format!("attack {id}"),
+            strength: Some(0.5),
+            seed: 1,
+            demodulator,
+            asked: "recipient 1".into(),
+            guilty: true,
+            verdict: Some(verdict.into()),
+            reason: "so it is".into(),
+            bits: if bit_errors.is_some() { 128 } else { 0 },
+            bit_errors,
+            p_value_log10: bit_errors.map(|errors| errors as f64 - 30.0),
+            p_mark_log10: None,
+            p_recipient_log10: None,
+            registration: Some("landmarks".into()),
+            landmarks: 20,
+            rms_m: Some(0.1),
+            vertices_reference: 3000,
+            vertices_suspect: 3000,
+            vertices_matched: 2900,
+            seconds: 1.0,
+        }
+    }
 
     #[test]
     fn a_suspect_that_was_not_registered_counts_as_guessing_and_is_counted() {

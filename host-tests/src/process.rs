@@ -1,6 +1,6 @@
 //! A process, timed, with its peak memory.
 
-use super::Result;
+use crate::Result;
 use serde::Serialize;
 use std::{
     collections::HashMap,

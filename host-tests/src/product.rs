@@ -1,7 +1,6 @@
 //! The product as its users have it: the driver inside `ogr2ogr`, and the command `meshmark`.
 
-use super::Result;
-use crate::attacks::Random;
+use crate::{Result, attacks::Random, built};
 use meshmark_core::key::SecretKey;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -119,12 +118,13 @@ impl Product {
     /// The build this program or test belongs to.
     ///
     /// # Errors
-    /// As [`Product::in_folder`].
+    /// As [`Product::in_folder`], and when a source is newer than the build.
     pub fn of_this_build() -> Result<Self> {
-        let program = std::env::current_exe()?;
-        let folders: Vec<&Path> = program.ancestors().skip(1).collect();
-        let has_command = |folder: &&&Path| folder.join("meshmark").is_file();
-        Self::in_folder(folders.iter().find(has_command).unwrap_or(&folders[0]))
+        let folder = built::folder()?;
+        let product = Self::in_folder(&folder)?;
+        built::check(&product.meshmark, &folder.join("meshmark.d"))?;
+        built::check(&product.plugins.join("ogr_MESHMARK.so"), &folder.join("libmeshmark_plugin.d"))?;
+        Ok(product)
     }
 
     /// The same with further options of the driver, NAME=value.
@@ -137,8 +137,25 @@ impl Product {
     /// # Errors
     /// The command cannot be run.
     pub fn version(&self) -> Result<String> {
-        let output = Command::new(&self.meshmark).arg("--version").output()?;
+        let output = self.meshmark().arg("--version").output()?;
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_string())
+    }
+
+    /// The command `meshmark`.
+    pub fn meshmark(&self) -> Command {
+        Command::new(&self.meshmark)
+    }
+
+    /// The folder of the driver.
+    pub fn plugins(&self) -> &Path {
+        &self.plugins
+    }
+
+    /// `ogr2ogr` with the driver.
+    pub fn ogr2ogr(&self) -> Command {
+        let mut command = Command::new("ogr2ogr");
+        command.env("GDAL_DRIVER_PATH", &self.plugins);
+        command
     }
 
     /// Marks `source` as the driver does on export, with a record beside the marked GeoPackage.
@@ -146,9 +163,6 @@ impl Product {
     /// # Errors
     /// What ogr2ogr prints.
     pub fn mark(&self, source: &Path, marked: &Path, record: &Path, marking: Marking) -> Result<()> {
-        let mut command = Command::new("ogr2ogr");
-        command.env("GDAL_DRIVER_PATH", &self.plugins).args(["-q", "-f", "GPKG"]).arg(marked);
-        command.arg(format!("MESHMARK:{}", source.display()));
         let options = [
             ("KEY", marking.key.display().to_string()),
             ("RECIPIENT", marking.recipient.into()),
@@ -157,6 +171,21 @@ impl Product {
             ("PRECISION", marking.precision.to_string()),
             ("RECORD", record.display().to_string()),
         ];
+        self.export(source, marked, options)
+    }
+
+    /// Marks `source` on export to a GeoPackage with these options of the driver and those of the product.
+    ///
+    /// # Errors
+    /// What ogr2ogr prints.
+    pub fn export(
+        &self,
+        source: &Path,
+        marked: &Path,
+        options: impl IntoIterator<Item = (&'static str, String)>,
+    ) -> Result<()> {
+        let mut command = self.ogr2ogr();
+        command.args(["-q", "-f", "GPKG"]).arg(marked).arg(format!("MESHMARK:{}", source.display()));
         for (name, value) in options {
             command.arg("-oo").arg(format!("{name}={value}"));
         }
@@ -181,7 +210,7 @@ impl Product {
         registration: &str,
         suspect: &Path,
     ) -> Result<Report> {
-        let mut command = Command::new(&self.meshmark);
+        let mut command = self.meshmark();
         command.env("RAYON_NUM_THREADS", "1").args(["verify", "--json", "--demodulator", demodulator]);
         command.args(["--registration", registration]);
         command.arg("--key").arg(key).arg("--reference").arg(reference);

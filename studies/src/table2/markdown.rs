@@ -1,11 +1,16 @@
 //! The report as Markdown.
 
 use super::{
-    cases::{DEMODULATORS, Table},
-    experiment::Outcome,
     paper,
+    summary::{Cell, cell, distinct},
+};
+use meshmark_host_tests::{
+    experiment::{
+        Outcome, bit_error_percent,
+        cases::{DEMODULATORS, Table},
+        is_match,
+    },
     product::Profile,
-    summary::{Cell, bit_error_percent, cell, distinct, is_match},
 };
 use std::fmt::Write;
 
@@ -231,7 +236,7 @@ fn per_map(outcomes: &[Outcome], table: Table, chip_rate: usize, demodulator: &s
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table2::experiment::tests::outcome;
+    use crate::table2::summary::tests::outcome;
 
     #[test]
     fn the_published_rate_stands_beside_ours() {

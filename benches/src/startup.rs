@@ -1,6 +1,6 @@
 //! What the driver costs those who do not use it.
 
-use super::{Result, process::Run};
+use meshmark_host_tests::{Result, process::Run};
 use std::{path::Path, process::Command};
 
 /// Programs started with the driver and without, in turns.

@@ -3,16 +3,17 @@
 //! invalid, or two overlap that did not.
 
 use clap::Parser;
-use meshmark_core::options::{Laplacian, Rigidity};
+use meshmark_core::{
+    key::SecretKey,
+    options::{Laplacian, Rigidity},
+};
+use meshmark_host_tests::{Result, product::Product};
 use serde_json::Value;
 use std::{
-    error::Error,
     fs,
     path::{Path, PathBuf},
-    process::{Command, ExitCode, Output},
+    process::ExitCode,
 };
-
-type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 /// What marking does to the shape and topology of maps.
 #[derive(Parser)]
@@ -106,30 +107,18 @@ impl Marked {
     }
 }
 
-/// A folder for the copies, and where the programs are.
+/// A folder for the copies, and what makes them.
 struct Work {
     folder: tempfile::TempDir,
-    meshmark: PathBuf,
-    plugins: PathBuf,
-    options: Vec<String>,
+    product: Product,
     precision: Option<String>,
 }
 
 impl Work {
     fn new(options: Vec<String>, precision: Option<String>) -> Result<Self> {
-        let here = std::env::current_exe()?.parent().ok_or("this program has no folder")?.to_path_buf();
-        let work = Work {
-            folder: tempfile::tempdir()?,
-            meshmark: here.join("meshmark"),
-            plugins: here.join("gdalplugins"),
-            options,
-            precision,
-        };
-        if !work.meshmark.exists() || !work.plugins.exists() {
-            return Err("the driver or the command is missing: run `make build` first".into());
-        }
-        let key = meshmark_core::key::SecretKey::from_bytes([7; 32]);
-        fs::write(work.path("key.json"), key.to_json().as_bytes())?;
+        let product = Product::of_this_build()?.with_options(options);
+        let work = Work { folder: tempfile::tempdir()?, product, precision };
+        fs::write(work.path("key.json"), SecretKey::from_bytes([7; 32]).to_json().as_bytes())?;
         Ok(work)
     }
 
@@ -144,35 +133,28 @@ impl Work {
                 fs::remove_file(file)?;
             }
         }
-        let mut command = Command::new("ogr2ogr");
-        command.env("GDAL_DRIVER_PATH", &self.plugins).args(["-q", "-f", "GPKG"]).arg(&copy);
-        command.arg(format!("MESHMARK:{}", map.canonicalize()?.display()));
-        for (name, value) in [
+        let options = [
             ("KEY", self.path("key.json").display().to_string()),
             ("RECIPIENT", "quality".into()),
             ("RECORD", record.display().to_string()),
             ("SHAPE", shape.into()),
             ("BASIS", basis.into()),
-        ] {
-            command.arg("-oo").arg(format!("{name}={value}"));
-        }
-        command.args(self.options.iter().flat_map(|option| ["-oo", option]));
-        succeeded(command.output()?)?;
-        let mut command = Command::new(&self.meshmark);
-        command.args(["compare", "--json"]).args([map, &copy]);
-        command.args(self.precision.iter().flat_map(|precision| ["--precision", precision]));
-        let comparison = succeeded(command.output()?)?;
+        ];
+        self.product.export(map, &copy, options)?;
         Ok(Marked {
-            comparison: serde_json::from_slice(&comparison)?,
+            comparison: self.compare(map, &copy)?,
             record: serde_json::from_slice(&fs::read(record)?)?,
         })
     }
-}
 
-/// What a program printed; what it complained about as an error.
-fn succeeded(output: Output) -> Result<Vec<u8>> {
-    match output.status.success() {
-        true => Ok(output.stdout),
-        false => Err(String::from_utf8_lossy(&output.stderr).trim().into()),
+    fn compare(&self, map: &Path, copy: &Path) -> Result<Value> {
+        let mut command = self.product.meshmark();
+        command.args(["compare", "--json"]).args([map, copy]);
+        command.args(self.precision.iter().flat_map(|precision| ["--precision", precision]));
+        let output = command.output()?;
+        match output.status.success() {
+            true => Ok(serde_json::from_slice(&output.stdout)?),
+            false => Err(String::from_utf8_lossy(&output.stderr).trim().into()),
+        }
     }
 }

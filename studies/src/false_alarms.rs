@@ -2,14 +2,7 @@
 //! uniform. A suspect is examined once as `meshmark verify` does; what depends on key and recipient is then repeated
 //! for many of them.
 
-use crate::{
-    attacks::{Attack, Map, Random, noise, paper_rows},
-    plot::{Axis, Plot, Series},
-    table2::{
-        Result,
-        product::{Marking, Product, Profile, random_key},
-    },
-};
+use crate::plot::{Axis, Plot, Series};
 use meshmark_core::{
     carrier::{Carrier, bit_of_coefficient},
     demodulation::Demodulation,
@@ -21,6 +14,11 @@ use meshmark_detection::{
     Demodulator,
     decision::{Decision, Expected, Null, decide_among},
     registration::Start,
+};
+use meshmark_host_tests::{
+    Result,
+    attacks::{Attack, Map, Random, noise, paper_rows},
+    product::{Marking, Product, Profile, random_key},
 };
 use meshmark_verifier::{Request, progress::Progress, verify};
 use plotters::style::{BLACK, BLUE, RED};

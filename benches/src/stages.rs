@@ -1,6 +1,5 @@
 //! The stages of marking, in this process: the best of two runs, seconds.
 
-use super::Result;
 use gdal::Dataset;
 use meshmark_core::{
     embedding::embed,
@@ -11,6 +10,7 @@ use meshmark_core::{
     spectrum::Basis,
 };
 use meshmark_dataset::{Selection, Survey, survey};
+use meshmark_host_tests::Result;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::{hint::black_box, path::Path, time::Instant};

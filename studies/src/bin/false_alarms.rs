@@ -1,10 +1,8 @@
 //! Counts false alarms: p-values of wrong keys and wrong recipients on marked, attacked and unmarked maps.
 
 use clap::Parser;
-use meshmark_host_tests::{
-    false_alarms::{markdown, pooled, study, write},
-    table2::{Result, product::Product},
-};
+use meshmark_host_tests::{Result, product::Product};
+use meshmark_studies::false_alarms::{markdown, pooled, study, write};
 use std::{path::PathBuf, process::ExitCode};
 
 /// Take wrong keys and wrong recipients to marked, attacked and unmarked copies of maps.

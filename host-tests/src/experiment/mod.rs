@@ -1,11 +1,13 @@
 //! The experiment: maps are rounded and marked, copies attacked, suspects verified.
 
-use super::{
+pub mod cases;
+
+use crate::{
     Result,
-    cases::{Case, INNOCENTS, Table, all},
+    attacks::{Map, collusion, noise, similarity},
     product::{Asked, Marking, Product, Profile, Report, write_key},
 };
-use crate::attacks::{Map, collusion, noise, similarity};
+use cases::{Case, INNOCENTS, Table, all};
 use meshmark_core::ground::Ground;
 use meshmark_dataset::{Selection, survey};
 use serde::Serialize;
@@ -70,6 +72,16 @@ pub struct Outcome {
     pub vertices_suspect: usize,
     pub vertices_matched: usize,
     pub seconds: f64,
+}
+
+/// The bit error rate of one suspect; `None` when it was not registered.
+pub fn bit_error_percent(outcome: &Outcome) -> Option<f64> {
+    Some(100.0 * outcome.bit_errors? as f64 / outcome.bits as f64)
+}
+
+/// Whether the verdict is that the mark is there.
+pub fn is_match(outcome: &Outcome) -> bool {
+    outcome.verdict.as_deref() == Some("match")
 }
 
 /// A copy of a map.
@@ -334,56 +346,21 @@ fn seed_of(seed: u64, map: &str, case: &str) -> u64 {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-
-    /// An outcome on a map called "town"; `None` bit errors is a suspect that was not registered.
-    pub fn outcome(
-        id: &str,
-        chip_rate: usize,
-        demodulator: &'static str,
-        bit_errors: Option<usize>,
-    ) -> Outcome {
-        let verdict = if bit_errors.is_some_and(|errors| errors < 30) { "match" } else { "inconclusive" };
-        Outcome {
-            table: Table::Paper,
-            map: "town".into(),
-            profile: Profile::repetition(chip_rate),
-            case: id.into(),
-            title: format!("attack {id}"),
-            strength: Some(0.5),
-            seed: 1,
-            demodulator,
-            asked: "recipient 1".into(),
-            guilty: true,
-            verdict: Some(verdict.into()),
-            reason: "so it is".into(),
-            bits: if bit_errors.is_some() { 128 } else { 0 },
-            bit_errors,
-            p_value_log10: bit_errors.map(|errors| errors as f64 - 30.0),
-            p_mark_log10: None,
-            p_recipient_log10: None,
-            registration: Some("landmarks".into()),
-            landmarks: 20,
-            rms_m: Some(0.1),
-            vertices_reference: 3000,
-            vertices_suspect: 3000,
-            vertices_matched: 2900,
-            seconds: 1.0,
-        }
-    }
+    use crate::plugin::fixture;
+    use std::collections::BTreeSet;
 
     #[test]
     fn a_seed_belongs_to_a_map_and_a_case() {
         assert_eq!(seed_of(1, "a", "9c"), seed_of(1, "a", "9c"));
         let seeds =
             [seed_of(1, "a", "9c"), seed_of(2, "a", "9c"), seed_of(1, "b", "9c"), seed_of(1, "a", "9b")];
-        assert_eq!(crate::table2::summary::distinct(seeds.into_iter()).len(), 4);
+        assert_eq!(BTreeSet::from(seeds).len(), 4);
     }
 
     #[test]
     fn a_map_in_degrees_is_refused() {
-        let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/europe_deg.gpkg"));
-        assert!(check_metres(fixture).unwrap_err().to_string().contains("not in metres"));
+        assert!(check_metres(&fixture("europe_deg.gpkg")).unwrap_err().to_string().contains("not in metres"));
     }
 }

@@ -9,8 +9,9 @@ use clap::Parser;
 use geo::{CoordsIter, Geometry};
 use meshmark_core::vertices::VertexTable;
 use meshmark_host_tests::{
-    attacks::{Map, Random, Result, crop, features, vertices},
-    table2::product::{Asked, Marking, Product, Profile, Registration, write_key},
+    Result,
+    attacks::{Map, Random, crop, features, vertices},
+    product::{Asked, Marking, Product, Profile, Registration, write_key},
 };
 use std::{
     path::{Path, PathBuf},

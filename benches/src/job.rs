@@ -1,11 +1,12 @@
 //! Whole jobs on one map: plain `ogr2ogr`, the same through the driver, the numpy script, verification.
 
-use super::{
+use crate::stages::Stages;
+use meshmark_core::key::SecretKey;
+use meshmark_host_tests::{
     Result,
     process::{Run, Runs},
-    stages::Stages,
+    product::Product,
 };
-use meshmark_core::key::SecretKey;
 use serde::Serialize;
 use serde_json::Value;
 use std::{
@@ -28,9 +29,7 @@ const SMALL_PATCHES: [&str; 6] = ["-oo", "PATCH_SIZE=256", "-oo", "CHIP_RATE=1",
 /// The programs.
 #[derive(Debug, Clone)]
 pub struct Programs {
-    pub meshmark: PathBuf,
-    /// The folder of the driver.
-    pub plugins: PathBuf,
+    pub product: Product,
     /// A Python with the requirements of the numpy script, and the script.
     pub script: Option<[PathBuf; 2]>,
 }
@@ -148,8 +147,7 @@ impl<'a> Work<'a> {
     }
 
     fn ogr2ogr(&self, output: &str, source: &OsStr, options: &[&str]) -> Result<Run> {
-        let mut command = Command::new("ogr2ogr");
-        command.env("GDAL_DRIVER_PATH", &self.programs.plugins);
+        let mut command = self.programs.product.ogr2ogr();
         command.args(["-f", "GPKG"]).arg(self.output(output)?).arg(source).args(options);
         self.run(&mut command, &[0])
     }
@@ -163,7 +161,7 @@ impl<'a> Work<'a> {
     fn distribute(&self, recipients: usize) -> Result<Run> {
         let names: String = (1..=recipients).map(|number| format!("recipient {number}\n")).collect();
         fs::write(self.path("list.csv"), names)?;
-        let mut command = Command::new(&self.programs.meshmark);
+        let mut command = self.programs.product.meshmark();
         command.args([
             "distribute",
             "--key",
@@ -179,7 +177,7 @@ impl<'a> Work<'a> {
     }
 
     fn verify(&self) -> Result<Run> {
-        let mut command = Command::new(&self.programs.meshmark);
+        let mut command = self.programs.product.meshmark();
         command.stdout(File::create(self.path("report.json"))?);
         command.args(["verify", "--json", "--key", "key.json", "--recipient", "bench", "--reference"]);
         self.run(command.arg(self.map).arg("marked.gpkg"), &[0, 1, 3]) // the exit codes of the verdicts

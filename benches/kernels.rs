@@ -1,4 +1,4 @@
-//! The kernels against their rivals, on one thread: `cargo bench -p meshmark-host-tests --bench kernels`.
+//! The kernels against their rivals, on one thread: `cargo bench -p meshmark-benches`.
 //!
 //! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go. LAPACK is
 //! that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not installed is left out: the
@@ -7,6 +7,7 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::{Mat, Par, Side};
 use gdal::Dataset;
+use meshmark_cgal as cgal;
 use meshmark_core::{
     ground::Ground,
     mesh::Mesh,
@@ -16,7 +17,6 @@ use meshmark_core::{
 };
 use meshmark_dataset::{Selection, Survey, survey};
 use meshmark_detection::matching::Matcher;
-use meshmark_host_tests::cgal;
 use std::{
     io::Write,
     path::{Path, PathBuf},

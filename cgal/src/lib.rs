@@ -1,10 +1,13 @@
-//! CGAL's Delaunay triangulation, run as a program of its own: the oracle for our mesh.
+//! CGAL's Delaunay triangulation, run as a program of its own: the oracle for our mesh. Two triangulations are compared by
+//! [`delaunay_check`].
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/cgal/delaunay_edges.cpp");
+pub mod delaunay_check;
+
+const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/delaunay_edges.cpp");
 
 /// Compiles the oracle into `out_dir` unless it is there already, and returns its path.
 ///

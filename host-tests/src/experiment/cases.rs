@@ -1,7 +1,9 @@
 //! What is done to a marked map, and who is asked about afterwards.
 
-use super::product::Profile;
-use crate::attacks::{Map, Row, extended_rows, paper_rows};
+use crate::{
+    attacks::{Map, Row, extended_rows, paper_rows},
+    product::Profile,
+};
 use std::sync::Arc;
 
 /// The demodulators of the command, the paper's first.

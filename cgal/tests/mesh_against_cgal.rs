@@ -1,9 +1,9 @@
 //! Our mesh against CGAL's, on point sets that real maps are made of and on those that are known
 //! to break triangulations.
 
+use meshmark_cgal::{self as cgal, delaunay_check::differing_edges_are_cocircular};
 use meshmark_core::{mesh::Mesh, vertices::VertexTable};
 use meshmark_dataset::{Selection, TargetCrs, survey};
-use meshmark_host_tests::{cgal, delaunay_check::differing_edges_are_cocircular};
 use rand_chacha::{ChaCha20Rng, rand_core::Rng, rand_core::SeedableRng};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -74,7 +74,7 @@ fn random_with_duplicates() -> Vec<[f64; 2]> {
 
 fn vertices_of(map: &Path) -> VertexTable {
     let everything = Selection { target: TargetCrs::Raw, ..Selection::default() };
-    survey(&gdal::Dataset::open(map).unwrap(), &everything).unwrap().vertices
+    survey(&gdal::Dataset::open(map).unwrap(), &everything).unwrap().data.vertices
 }
 
 #[test]

@@ -1,14 +1,15 @@
 //! The figures: which attacks make a line, and which lines a plot.
 
 use super::{
-    Result,
-    cases::DEMODULATORS,
-    experiment::Outcome,
     paper,
-    product::Profile,
     summary::{cell, distinct},
 };
 use crate::plot::{Axis, Plot, Series};
+use meshmark_host_tests::{
+    Result,
+    experiment::{Outcome, cases::DEMODULATORS},
+    product::Profile,
+};
 use plotters::style::RGBColor;
 
 /// A family of attacks in several strengths.

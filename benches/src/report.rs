@@ -1,7 +1,8 @@
 //! What was measured, as Markdown and as a plot.
 
-use super::job::Jobs;
-use crate::plot::{Axis, Plot, Series};
+use crate::{job::Jobs, stages::Stages};
+use meshmark_host_tests::Result;
+use meshmark_studies::plot::{Axis, Plot, Series};
 use plotters::style::{BLUE, GREEN, RED, RGBColor};
 use std::fs;
 
@@ -58,7 +59,7 @@ fn ratio(a: f64, b: f64) -> String {
     if ratio.is_finite() { format!("{ratio:.1}") } else { "–".into() }
 }
 
-fn stage(jobs: &Jobs, of: impl Fn(&super::stages::Stages) -> String) -> String {
+fn stage(jobs: &Jobs, of: impl Fn(&Stages) -> String) -> String {
     jobs.stages.as_ref().map_or("–".into(), of)
 }
 
@@ -115,7 +116,7 @@ fn exponent(all: &[Jobs], of: fn(&Jobs) -> f64) -> Option<f64> {
 ///
 /// # Errors
 /// As [`Plot::to_svg`].
-pub fn plots(all: &[Jobs]) -> Result<[(&'static str, String); 2], Box<dyn std::error::Error + Send + Sync>> {
+pub fn plots(all: &[Jobs]) -> Result<[(&'static str, String); 2]> {
     let series = |name: &str, colour: RGBColor, thin: bool, of: &dyn Fn(&Jobs) -> f64| {
         let points = all.iter().map(|jobs| (jobs.vertices as f64, of(jobs)));
         let points = points.filter(|point| point.1.is_finite() && point.1 > 0.0).collect();
