@@ -10,7 +10,8 @@ use std::{
     path::Path,
 };
 
-const CRATES: [&str; 5] = ["core", "detection", "dataset", "plugin", "verifier"];
+const CRATES: [&str; 9] =
+    ["core", "detection", "dataset", "plugin", "verifier", "host-tests", "studies", "benches", "cgal"];
 
 #[test]
 fn no_crate_has_a_circle_of_imports() {
@@ -18,7 +19,7 @@ fn no_crate_has_a_circle_of_imports() {
     let mut found = String::new();
     for name in CRATES {
         let modules = Modules::read(&workspace.join(name).join("src"));
-        assert!(modules.0.len() > 10, "{name} has its modules in src");
+        assert!(modules.0.len() > 1, "{name} has its modules in src");
         modules.circles().iter().for_each(|circle| writeln!(found, "{name}: {circle}").unwrap());
     }
     assert!(found.is_empty(), "modules that import each other:\n{found}");
