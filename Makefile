@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test demo bench table2 false-alarms faults quality conformance hosts newcomer qgis plugin-for-wheel deb install \
+.PHONY: build test test-studies demo bench table2 false-alarms faults quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -28,9 +28,12 @@ build: deps
 	mkdir -p $(PLUGINS)
 	install -m 755 $(BUILD)/libmeshmark_plugin.so $(PLUGIN)
 
-# The tests of driver and command compile neither plots nor benchmarks; those of the studies follow.
+# They compile neither plots nor benchmarks.
 test: build
 	$(WITH_GDAL) $(CARGO) test --release --locked
+
+# What the studies make of their own figures.
+test-studies: build
 	$(WITH_GDAL) $(CARGO) test --release --locked -p meshmark-studies
 
 demo: build
