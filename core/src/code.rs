@@ -71,7 +71,8 @@ impl Code {
 
     /// Returns the channel bits of a message as ±1: +1 for 1, −1 for 0.
     ///
-    /// # Panics Panics when [`Self::channel_bits`] fails for the length of the message.
+    /// # Panics
+    /// Panics when [`Self::channel_bits`] fails for the length of the message.
     pub fn encode(self, message: &Message) -> Vec<f64> {
         match self {
             Code::Repetition => message.signs(),
@@ -82,7 +83,8 @@ impl Code {
     /// Decodes the message from log-likelihood ratios of channel bits, positive = 1. The result depends on
     /// them alone.
     ///
-    /// # Panics Panics when LDPC is given other than 256 of them.
+    /// # Panics
+    /// Panics when LDPC is given other than 256 of them.
     pub fn decode(self, llrs: &[f64]) -> Decoded {
         match self {
             Code::Repetition => Decoded {

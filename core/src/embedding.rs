@@ -71,7 +71,8 @@ pub struct Embedding<'a> {
 impl<'a> Embedding<'a> {
     /// Meshes the map and cuts it into patches, for messages of `bits` bits.
     ///
-    /// # Errors Those of [`Patches::new`] and [`Patches::carriers`], and [`Error::PrecisionTooCoarse`].
+    /// # Errors
+    /// Those of [`Patches::new`] and [`Patches::carriers`], and [`Error::PrecisionTooCoarse`].
     pub fn new(
         map: &'a Map<'a>,
         key: &SecretKey,

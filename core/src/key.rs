@@ -18,7 +18,8 @@ const USUAL_TEXT: usize = 1024;
 
 /// Reads the text of a key file or a record.
 ///
-/// # Errors Fails when `source` fails, on bytes that are not UTF-8, and on more than 1 MiB.
+/// # Errors
+/// Fails when `source` fails, on bytes that are not UTF-8, and on more than 1 MiB.
 pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     let mut text = Zeroizing::new(String::with_capacity(USUAL_TEXT));
     source.take(LONGEST_TEXT + 1).read_to_string(&mut text)?;

@@ -18,7 +18,8 @@ impl Mesh {
     /// # Errors
     /// [`Error::Collinear`] when no triangle exists.
     ///
-    /// # Panics Panics when a coordinate is not finite or there are 2³² points, which
+    /// # Panics
+    /// Panics when a coordinate is not finite or there are 2³² points, which
     /// [`crate::vertices::VertexTable`] excludes.
     pub fn delaunay(points: &[[f64; 2]]) -> Result<Self> {
         let points: Vec<_> = points.iter().map(|&[x, y]| mitigate_underflow(Point2::new(x, y))).collect();

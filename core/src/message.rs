@@ -68,7 +68,8 @@ impl Message {
 
     /// Returns the message with one bit flipped.
     ///
-    /// # Panics Panics when there is no such bit.
+    /// # Panics
+    /// Panics when there is no such bit.
     pub fn with_flipped(&self, bit: usize) -> Self {
         let mut flipped = self.clone();
         flipped.bits[bit] = !flipped.bits[bit];

@@ -112,7 +112,8 @@ fn is_false(value: &bool) -> bool {
 impl Record {
     /// Reads a record's text and checks that its values are legal.
     ///
-    /// # Errors [`Error::Record`] describes the fault.
+    /// # Errors
+    /// [`Error::Record`] describes the fault.
     pub fn from_json(text: &str) -> Result<Self> {
         let record: Record = serde_json::from_str(text).map_err(|error| {
             // serde appends the list of all fields.
@@ -177,7 +178,8 @@ impl Record {
 
     /// Returns the subject of the mark.
     ///
-    /// # Errors Those of [`Record::message`], and [`Error::Record`] for a recipient with a whitened message.
+    /// # Errors
+    /// Those of [`Record::message`], and [`Error::Record`] for a recipient with a whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
             Some(_) if self.whitened => Err(Error::Record(

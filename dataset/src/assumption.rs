@@ -29,7 +29,8 @@ pub struct Assumption {
 impl Assumption {
     /// Applies the assumption to a map of raw coordinates and reprojects it into the CRS `target`.
     ///
-    /// # Errors Fails for coordinates that cannot be reprojected.
+    /// # Errors
+    /// Fails for coordinates that cannot be reprojected.
     pub fn apply(&self, raw: &Survey, target: &CoordinateSystem) -> Result<Survey> {
         raw.brought(target, |mut coords| {
             if self.axes_swapped {

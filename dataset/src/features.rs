@@ -19,7 +19,8 @@ pub struct FeatureGeometry {
 /// Reads the geometries of all features of the chosen layers (all when `None`), in the order of the dataset,
 /// without features that have none. `last_failure` is as in [`crate::Selection`].
 ///
-/// # Errors Fails for a layer that does not exist or cannot be read to its end, a malformed geometry, and
+/// # Errors
+/// Fails for a layer that does not exist or cannot be read to its end, a malformed geometry, and
 /// coordinates outside the extent of the CRS.
 pub fn features(
     dataset: &Dataset,

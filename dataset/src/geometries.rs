@@ -21,7 +21,8 @@ pub struct Outline {
 impl Outline {
     /// Reads well-known binary.
     ///
-    /// # Errors Fails for bytes that are not a geometry.
+    /// # Errors
+    /// Fails for bytes that are not a geometry.
     pub fn of_wkb(mut wkb: Vec<u8>) -> Result<Self, WkbError> {
         let (mut chains, mut kinds): (Vec<Vec<[f64; 2]>>, _) = (Vec::new(), Vec::new());
         wkb::map_coordinates::<WkbError>(&mut wkb, &mut |step, point| {

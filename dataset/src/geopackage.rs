@@ -31,7 +31,8 @@ const NUMBERS: [usize; 5] = [0, 4, 6, 6, 8];
 /// Calls `f` with every coordinate pair, writes the result back and fits the bounding box along x and y.
 /// Returns the box, or `None` for a geometry without coordinates.
 ///
-/// # Errors [`WkbError`] for bytes that are not such a geometry, the error of `f` when it fails.
+/// # Errors
+/// [`WkbError`] for bytes that are not such a geometry, the error of `f` when it fails.
 pub fn map_coordinates<E: From<WkbError>>(
     blob: &mut [u8],
     f: &mut impl FnMut([f64; 2]) -> Result<[f64; 2], E>,

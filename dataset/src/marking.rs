@@ -39,7 +39,8 @@ impl Moves<'_> {
 
     /// Moves every coordinate of a WKB geometry and returns their number.
     ///
-    /// # Errors Fails for a coordinate that is no vertex of the map and for bytes that are not a geometry.
+    /// # Errors
+    /// Fails for a coordinate that is no vertex of the map and for bytes that are not a geometry.
     pub fn geometry(&self, bytes: &mut [u8]) -> std::result::Result<usize, NotMoved> {
         let mut count = 0;
         wkb::map_coordinates::<NotMoved>(bytes, &mut |_, point| {

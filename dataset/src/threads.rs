@@ -22,7 +22,8 @@ pub struct ThreadPool {
 impl ThreadPool {
     /// Starts `threads` threads. Each runs `start` first and `end` last.
     ///
-    /// # Errors Fails when the system provides no more threads.
+    /// # Errors
+    /// Fails when the system provides no more threads.
     pub fn new(threads: usize, start: fn(), end: fn()) -> io::Result<Self> {
         let mut started = Joined(Vec::with_capacity(threads));
         let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);

@@ -34,7 +34,8 @@ pub enum Step {
 /// Calls `f` with every coordinate pair of a geometry and writes the result back. An empty point (NaN NaN)
 /// has none.
 ///
-/// # Errors [`WkbError`] for bytes that are not a geometry, the error of `f` when it fails.
+/// # Errors
+/// [`WkbError`] for bytes that are not a geometry, the error of `f` when it fails.
 pub fn map_coordinates<E: From<WkbError>>(
     wkb: &mut [u8],
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,

@@ -21,7 +21,8 @@ unsafe extern "C" {
 pub struct FeatureRef<'a>(OGRFeatureH, PhantomData<&'a ()>);
 
 impl FeatureRef<'_> {
-    /// # Safety The feature exists while this lives.
+    /// # Safety
+    /// The feature exists while this lives.
     pub unsafe fn new(feature: OGRFeatureH) -> Self {
         FeatureRef(feature, PhantomData)
     }

@@ -83,7 +83,8 @@ impl Options {
     /// Parses name-value pairs; names may be in any case. A message that is not given counts as long as a
     /// recipient's.
     ///
-    /// # Errors Fails on an unknown name, a name given twice, a value that its row excludes, both RECIPIENT
+    /// # Errors
+    /// Fails on an unknown name, a name given twice, a value that its row excludes, both RECIPIENT
     /// and MESSAGE, and bad hexadecimal digits.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(OPTIONS, pairs)?;
@@ -213,7 +214,8 @@ pub struct Creation {
 impl Creation {
     /// Parses the rows of [`CREATION_OPTIONS`].
     ///
-    /// # Errors Fails on an unknown name, a name given twice, an illegal value, and a missing REFERENCE.
+    /// # Errors
+    /// Fails on an unknown name, a name given twice, an illegal value, and a missing REFERENCE.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(CREATION_OPTIONS, pairs)?;
         let reference_path = values.text("REFERENCE")?.ok_or(Error::NoReference)?;
