@@ -1,5 +1,6 @@
-//! An examination, as values that are passed on: a [`Reference`] and a suspect that was registered are [`Matched`], what
-//! matched is [`Demodulated`], and what was demodulated is decided on (module [`crate::decision`]).
+//! An examination as a sequence of values: a [`Reference`] and a registered suspect form a
+//! [`Matched`] pair, which becomes [`Demodulated`] evidence; module [`crate::decision`] decides on
+//! it.
 
 use crate::{
     decision::Decoys,
@@ -21,43 +22,43 @@ use meshmark_core::{
     patches::Patches,
 };
 
-/// Which of core's demodulators to use.
+/// The choice of a demodulator of `meshmark-core`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Demodulator {
     /// The detector of Ohbuchi, Ueda and Endoh.
     Paper,
-    /// Least squares over the vertices that were found.
+    /// Least squares over the matched vertices.
     Joint,
 }
 
-/// What the mark in question is made with, but for its message.
+/// The properties of the tested mark without its message.
 #[derive(Clone, Copy)]
 pub struct Mark<'a> {
     /// The secret key.
     pub key: &'a SecretKey,
-    /// Bits of the message.
+    /// Length of the message, bits.
     pub bits: usize,
     /// The numbers that shape the mark.
     pub parameters: &'a Parameters,
 }
 
-/// The map before it was marked.
+/// The map before marking.
 pub struct Reference<'a> {
-    /// Its numbers.
+    /// The data of the map.
     pub data: &'a MapData,
-    /// Metres on the ground, as the mark has them.
+    /// The ground metric of the mark, metres per CRS unit.
     pub ground: Ground,
     /// The patches of its mesh.
     pub patches: Patches,
-    /// Coefficients of a patch and axis that carry the message.
+    /// Number of coefficients of a patch and axis that carry the message.
     carriers: usize,
 }
 
 impl<'a> Reference<'a> {
-    /// Meshes and cuts a map; `map` is `data` on the ground.
+    /// Meshes a map and cuts it into patches; `map` is `data` on the ground.
     ///
     /// # Errors
-    /// A mark of this kind does not fit the map.
+    /// Fails when a mark with these parameters does not fit the map.
     pub fn new(data: &'a MapData, map: &Map, bits: usize, parameters: &Parameters) -> Result<Self> {
         let patches = Patches::new(map, parameters)?;
         let carriers = patches.carriers(bits, parameters)?;
@@ -65,22 +66,22 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// A suspect on its reference.
+/// A suspect whose vertices are matched with those of its reference.
 pub struct Matched<'a> {
     /// The reference.
     pub reference: &'a Reference<'a>,
     /// The suspect, in the CRS of the reference.
     pub suspect: &'a MapData,
-    /// Vertices of the suspect where the registration puts them, CRS units.
+    /// Vertices of the suspect after registration, CRS units of the reference.
     pub moved: Vec<[f64; 2]>,
-    /// Which vertex is which.
+    /// The matches of the vertices.
     pub matches: Matches,
-    /// How many vertices match a suspect that is certainly not in place.
+    /// Number of vertices that match after the suspect is shifted out of place.
     pub by_chance: usize,
 }
 
 impl<'a> Matched<'a> {
-    /// Matches the vertices of a suspect within `radius_m`.
+    /// Matches the vertices of a registered suspect within `radius_m`, metres.
     pub fn new(
         reference: &'a Reference<'a>,
         suspect: &'a MapData,
@@ -97,16 +98,16 @@ impl<'a> Matched<'a> {
         Matched { reference, suspect, moved, matches, by_chance }
     }
 
-    /// Whether no more vertices match than chance makes: nothing can be demodulated.
+    /// Returns whether no more vertices match than by chance; demodulation is impossible then.
     pub fn is_chance(&self) -> bool {
         is_chance(self.matches.count, self.by_chance)
     }
 
-    /// Demodulates with a key. The paper's demodulator takes the matches as they are; the joint one follows a
-    /// deformation first, which changes them.
+    /// Demodulates with a key. The paper's demodulator uses the matches unchanged; the joint one
+    /// follows a deformation first, which changes them.
     ///
     /// # Errors
-    /// Those of the demodulation.
+    /// Returns the errors of the demodulation.
     pub fn demodulate(
         &self,
         mark: Mark,
@@ -148,16 +149,17 @@ impl<'a> Matched<'a> {
     }
 }
 
-/// What a suspect says under one key.
+/// The evidence of a suspect under one key.
 pub struct Demodulated {
     /// The evidence.
     pub found: Demodulation,
-    /// Which vertex is which, after a deformation was followed.
+    /// The matches of the vertices after tracking of the deformation.
     pub matches: Matches,
-    /// The deformation that was estimated; none by the demodulator of the paper.
+    /// The estimated deformation; none with the demodulator of the paper.
     pub deformation: Option<Deformation>,
-    /// Of every reference vertex: 1, or less where its displacement does not fit in with the others.
+    /// The weight of every reference vertex: 1, or less where its displacement disagrees with the
+    /// others.
     pub weights: Vec<f64>,
-    /// How decoy keys score; none where nothing moved.
+    /// Scores of decoy keys; none where no vertex moved.
     pub decoys: Option<Decoys>,
 }

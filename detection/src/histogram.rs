@@ -2,19 +2,19 @@
 
 use serde::Serialize;
 
-/// A histogram.
+/// Counts of values in bins of equal width.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Histogram {
-    /// Where the first bin begins.
+    /// Lower end of the first bin.
     pub from: f64,
     /// Width of every bin.
     pub width: f64,
-    /// Values in every bin, its lower end included.
+    /// Number of values in every bin, its lower end included.
     pub counts: Vec<usize>,
 }
 
 impl Histogram {
-    /// Of finite values, in at most about `bins` bins; none without values.
+    /// Counts finite values in about `bins` bins at most; returns `None` without values.
     pub fn of_values(values: &[f64], bins: usize) -> Option<Self> {
         let least = values.iter().copied().reduce(f64::min)?;
         let most = values.iter().copied().reduce(f64::max)?;
@@ -29,7 +29,8 @@ impl Histogram {
     }
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below a positive value; a thousandth for none.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is at least `value`; 10⁻³ unless
+/// the value is positive and finite.
 pub fn round_up(value: f64) -> f64 {
     if value <= 0.0 || !value.is_finite() {
         return 1e-3;

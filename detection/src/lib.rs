@@ -1,4 +1,4 @@
-//! Detection: two maps as numbers in, a verdict out. No files, no GDAL.
+//! Detection compares two maps as numbers and returns a verdict. It uses no files and no GDAL.
 //!
 //! ```text
 //! reference ─► patches ───────────────────────┐
@@ -12,10 +12,11 @@
 //! | Where does the suspect lie on the reference? | [`registration`] |
 //! | Which vertex is which, and within which radius? | [`matching`] |
 //! | What moved the vertices besides the mark? | `tracking.rs`, and `deformation` of `meshmark-core` |
-//! | What do the displacements say under a key? | [`Matched::demodulate`] |
+//! | What evidence do the displacements give under a key? | [`Matched::demodulate`] |
 //! | Match, no match, or inconclusive, at what p-value? | [`decision`] |
 //!
-//! A synthetic town is marked for a recipient, shifted, and recognised as that recipient's copy:
+//! The example marks a synthetic town for a recipient, shifts it, and recognises the copy of that
+//! recipient:
 //!
 //! ```
 //! use meshmark_core::{embedding, ground::Ground, key::SecretKey, map_data::{ChainKind, MapData}, options::*};

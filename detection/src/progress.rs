@@ -1,18 +1,18 @@
-//! What a long examination reports while it runs.
+//! Progress reports of a long examination.
 
-/// One report.
+/// One progress report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// A stage begins.
     Stage {
-        /// Its name.
+        /// Name of the stage.
         stage: &'static str,
-        /// How many steps it has; 0 where that is not known.
+        /// Number of its steps; 0 where it is unknown.
         steps: u64,
     },
-    /// So many steps of the stage are done.
+    /// This many further steps of the stage are done.
     Steps(usize),
 }
 
-/// Who is told; it may be called from any thread.
+/// Receives the progress reports; any thread may call it.
 pub type Listener<'a> = &'a (dyn Fn(Progress) + Sync);

@@ -1,4 +1,4 @@
-//! Tracking: a deformation that moved vertices out of the matching radius is followed.
+//! Tracking: follows a deformation that moved vertices out of the matching radius.
 
 use crate::matching::{Graph, Matcher, Matches};
 use meshmark_core::{
@@ -10,32 +10,34 @@ use meshmark_core::{
     patches::Patches,
 };
 
-/// How often vertices are matched again around the predicted deformation.
+/// Number of rounds in which vertices are matched around the predicted deformation.
 const ROUNDS: usize = 3;
 
-/// Follows a deformation that moved vertices out of the matching radius: matches give a deformation, the
-/// deformation says where to look for more matches. It never looks at the key, so decoys see the same.
+/// Follows a deformation that moved vertices out of the matching radius: matches give a
+/// deformation, and the deformation predicts the places of more matches. The key is not involved,
+/// so decoys have the same input.
 pub struct Tracking<'a> {
     reference: &'a MapData,
     moved: &'a [[f64; 2]],
     ground: &'a Ground,
     patches: &'a Patches,
-    /// Of the reference and of the suspect.
+    /// Graphs of the reference and of the suspect.
     graphs: [Graph; 2],
 }
 
-/// What came of it.
+/// The result of tracking.
 pub struct Followed {
-    /// Which vertex is which.
+    /// The matches of the vertices.
     pub matches: Matches,
-    /// What to demodulate: displacements, their noise shaped.
+    /// The displacements to demodulate, with shaped noise, metres.
     pub observed: Vec<Option<[f64; 2]>>,
-    /// What moved the vertices besides the mark.
+    /// The predicted deformation and noise besides the mark.
     pub disturbance: Prediction,
 }
 
 impl<'a> Tracking<'a> {
-    /// Of a reference and its suspect, whose vertices are `moved` onto the reference.
+    /// Prepares a reference and its suspect; `moved` are the vertices of the suspect in reference
+    /// coordinates.
     pub fn new(
         (reference, suspect): (&'a MapData, &MapData),
         moved: &'a [[f64; 2]],
@@ -46,10 +48,11 @@ impl<'a> Tracking<'a> {
         Tracking { reference, moved, ground, patches, graphs }
     }
 
-    /// Matches until the deformation is found, `carriers` coefficients of a patch and axis carrying the mark.
+    /// Matches until the deformation is found, where `carriers` coefficients of a patch and axis
+    /// carry the mark.
     ///
     /// # Errors
-    /// Those of the estimation.
+    /// Returns the errors of the estimation.
     pub fn follow(&self, carriers: usize, parameters: &Parameters, radius_m: f64) -> Result<Followed> {
         let coords = self.reference.vertices.coords();
         let mut matches = self.match_joined(coords, radius_m);
@@ -90,13 +93,14 @@ impl<'a> Tracking<'a> {
         self.match_joined(&expected, radius_m)
     }
 
-    /// `expected`: where the reference vertices should be found.
+    /// Matches with the expected places of the reference vertices, CRS units.
     fn match_joined(&self, expected: &[[f64; 2]], radius_m: f64) -> Matches {
         let matcher = Matcher::new(expected, self.ground, self.reference.vertices.centre());
         matcher.joined(self.moved, radius_m, self.graphs.each_ref())
     }
 
-    /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches.
+    /// Returns the displacement of every reference vertex, metres; `None` where no suspect vertex
+    /// matches.
     fn displacements(&self, matches: &Matches) -> Vec<Option<[f64; 2]>> {
         matches.displacements_m(self.reference.vertices.coords(), self.moved, self.ground)
     }

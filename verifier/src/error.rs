@@ -1,4 +1,4 @@
-//! What ends a command early. Every message names the input and the remedy.
+//! The errors that end a command early. Every message names the input and the remedy.
 
 use crate::exit_code::ExitCode;
 use meshmark_core::{counted, options::Spelling};
@@ -8,7 +8,7 @@ use std::{io, path::PathBuf};
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What ends a command early.
+/// An error that ends a command early.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
@@ -147,7 +147,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit code of this error.
+    /// Returns the exit code of this error.
     pub fn exit_code(&self) -> ExitCode {
         use Error::*;
         match self {

@@ -1,15 +1,15 @@
-//! What the exit code of the command means.
+//! The exit codes of the command.
 
-/// What the command's exit code says.
+/// An exit code of the command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExitCode {
-    /// The mark is there.
+    /// The suspect carries the mark.
     Match = 0,
-    /// The mark would have shown, and does not.
+    /// The suspect does not carry the mark, which would be detectable.
     NoMatch = 1,
     /// The command line, an option or a key or record file is wrong.
     Usage = 2,
-    /// The suspect cannot answer the question.
+    /// The suspect does not allow an answer.
     Inconclusive = 3,
     /// The record does not belong to this reference or this key.
     DoesNotBelong = 4,
@@ -22,7 +22,7 @@ pub enum ExitCode {
 }
 
 impl ExitCode {
-    /// All of them.
+    /// All exit codes.
     pub const ALL: [ExitCode; 8] = [
         ExitCode::Match,
         ExitCode::NoMatch,
@@ -34,7 +34,7 @@ impl ExitCode {
         ExitCode::Unwritable,
     ];
 
-    /// What it means to `meshmark verify`.
+    /// Returns the meaning of the code for `meshmark verify`.
     pub fn meaning(self) -> &'static str {
         match self {
             ExitCode::Match => "match",

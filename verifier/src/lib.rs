@@ -1,7 +1,8 @@
-//! The verifier: is this suspect a copy of that marked map?
+//! The verifier decides whether a suspect is a copy of a given marked map.
 //!
-//! The data flows one way: [`inputs`] → [`verify`](mod@verify), which hands numbers to `meshmark-detection` → [`report`] → [`html`].
-//! [`compare`] is about what marking did to a map, [`distribute`] marks one for many recipients.
+//! The data flows one way: [`inputs`] → [`verify`](mod@verify), which passes numbers to
+//! `meshmark-detection` → [`report`] → [`html`]. [`compare`] measures the effect of marking on a
+//! map, [`distribute`] marks a map for many recipients.
 #![forbid(unsafe_code)]
 
 pub mod compare;

@@ -1,4 +1,4 @@
-//! Man pages and shell completions, made from the command line as it is.
+//! Man pages and shell completions, generated from the command line.
 
 use clap::{Command, builder::PossibleValuesParser};
 use clap_complete::{Shell, generate_to};
@@ -14,8 +14,8 @@ use std::{
     path::Path,
 };
 
-/// Writes `meshmark.1`, a page for every subcommand, and completions for bash, zsh and fish into a folder, which is made
-/// when it is missing.
+/// Writes `meshmark.1`, a page for every subcommand, and completions for bash, zsh and fish into a
+/// folder, which is created if necessary.
 pub fn write(command: Command, folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let mut command = visible(command);
@@ -28,7 +28,7 @@ pub fn write(command: Command, folder: &Path) -> io::Result<()> {
     pages.iter().try_for_each(|page| write_page(page, &pages, folder))
 }
 
-/// What users are shown, with the words that options may be.
+/// Returns the visible part of a command, with the legal values of its options.
 fn visible(command: Command) -> Command {
     let subcommands = command.get_subcommands().filter(|subcommand| !subcommand.is_hide_set());
     let subcommands: Vec<Command> = subcommands.cloned().map(with_words).collect();

@@ -1,10 +1,10 @@
-//! Progress of long steps, shown on a terminal only.
+//! Progress of long steps, which appears on a terminal only.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use meshmark_detection::{Listener, Progress as Event};
 use std::{collections::BTreeMap, sync::Mutex, time::Instant};
 
-/// Shows what is being done and remembers how long each stage took.
+/// Shows the current stage and records the duration of each.
 pub struct Progress {
     bar: ProgressBar,
     stage: Option<(&'static str, Instant)>,
@@ -19,7 +19,7 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// Starts a stage of `steps` steps (0: unknown) and ends the one before.
+    /// Starts a stage of `steps` steps (0: unknown) and ends the previous one.
     pub fn start(&mut self, stage: &'static str, steps: u64) {
         self.finish();
         self.stage = Some((stage, Instant::now()));
@@ -31,7 +31,7 @@ impl Progress {
         self.bar.tick();
     }
 
-    /// Steps done, callable from any thread.
+    /// Returns a function that counts steps; any thread may call it.
     pub fn stepper(&self) -> impl Fn(usize) + Sync + use<> {
         let bar = self.bar.clone();
         move |steps| bar.inc(steps as u64)
@@ -49,7 +49,7 @@ impl Progress {
         })
     }
 
-    /// Ends the last stage and clears the line; seconds by stage.
+    /// Ends the last stage and clears the line; returns the seconds by stage.
     pub fn finish(&mut self) -> &BTreeMap<&'static str, f64> {
         if let Some((stage, since)) = self.stage.take() {
             *self.seconds.entry(stage).or_default() += since.elapsed().as_secs_f64();

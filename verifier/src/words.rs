@@ -1,20 +1,21 @@
 //! Numbers and names in messages and reports.
 
-/// A probability from its logarithm.
+/// Formats a probability, given its logarithm.
 pub fn power_of_ten(log10: f64) -> String {
     if log10 > -3.0 { format!("{:.3}", 10f64.powf(log10)) } else { format!("10^{log10:.1}") }
 }
 
-/// Text of a file on one line, without what would steer a terminal or turn the order of what is read.
+/// Returns text of a file on one line, without characters that control a terminal or change the
+/// text direction.
 pub fn printable(text: &str) -> String {
     let turns = |c: char| matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     text.chars().map(|c| if c.is_control() || turns(c) { '\u{fffd}' } else { c }).collect()
 }
 
-/// A longer name fills pages.
+/// Length to which names are cut, characters; a longer name fills pages.
 const LONGEST_NAME: usize = 200;
 
-/// The same of a name, cut short when it fills pages; the JSON has all of it.
+/// Returns a printable name, cut to the limit; the JSON report has the full name.
 pub(crate) fn clipped(name: &str) -> String {
     let printable = printable(name);
     match printable.char_indices().nth(LONGEST_NAME) {

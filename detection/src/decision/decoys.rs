@@ -1,5 +1,5 @@
-//! Decoys: how keys that do not exist score on the same suspect. The p-values rest on the analytic null;
-//! this shows that it holds here.
+//! Decoys: the scores of nonexistent keys on the same suspect. The p-values rest on the analytic
+//! null distribution; the decoys show that it holds for this suspect.
 
 use crate::histogram::Histogram;
 use meshmark_core::{demodulation::Demodulation, vertices::VertexTable};
@@ -12,25 +12,25 @@ const BINS: usize = 20;
 /// Scores of decoy keys, in standard deviations of the null hypothesis.
 #[derive(Debug, Clone, Serialize)]
 pub struct Decoys {
-    /// How many.
+    /// Number of decoys.
     pub count: usize,
-    /// SHA-256 of "meshmark decoys" and the digests of the suspect's and the reference's vertices: equal maps
-    /// have equal decoys, and nobody can choose them.
+    /// SHA-256 of "meshmark decoys" and the digests of the vertices of the suspect and the
+    /// reference. Equal maps have equal decoys, and nobody can choose them.
     pub seed: String,
-    /// Mean of their scores.
+    /// Mean of the scores.
     pub mean: f64,
-    /// Standard deviation of their scores.
+    /// Standard deviation of the scores.
     pub standard_deviation: f64,
     /// The largest score.
     pub largest: f64,
-    /// How often each score occurs.
+    /// Frequency of the scores.
     pub histogram: Histogram,
     /// The score of the key and message in question; null when no message was expected.
     pub tested: Option<f64>,
 }
 
 impl Decoys {
-    /// Scores decoys on a suspect; `None` where nothing was observed to move.
+    /// Scores decoys on a suspect. Returns `None` where no displacement was observed.
     pub fn new(found: &Demodulation, suspect: &VertexTable, reference: &VertexTable) -> Option<Self> {
         if found.chip_correlations.iter().all(|a| *a == 0.0) {
             return None;

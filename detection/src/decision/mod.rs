@@ -1,13 +1,17 @@
 //! The decision: two questions, two null hypotheses.
 //!
-//! *Was this key used?* Under another key the chips are independent random signs. Given the suspect,
-//! the sum Σ p_i b′_i a_i then has mean 0 and variance Σ a_i², whatever happened to the map, so the score is
-//! standard normal (a sum of thousands of independent signs; its tail is at most 3.18 times the normal
-//! one, Bentkus and Dzindzalieta 2015). *Is it this recipient?* Under the right key, an unrelated
-//! recipient has a random message: Σ w_j b′_j b̂_j over the channel bits has mean 0 and variance |w b̂|². With
-//! `CODE=LDPC` b′ is a random code word, not independent signs: any four of its bits are independent, and over random
-//! messages the tail is that of the normal distribution (tests of core's `demodulation.rs`). A message that the key
-//! did not whiten is no random one, and any other message is a null hypothesis too: [`Null`]. The largest p counts.
+//! *Was this key used?* Under another key the chips are independent random signs. Given the
+//! suspect, the sum Σ p_i b′_i a_i then has mean 0 and variance Σ a_i², whatever the attack, so the
+//! score is standard normal (a sum of thousands of independent signs; its tail is at most 3.18
+//! times the normal tail, Bentkus and Dzindzalieta 2015).
+//!
+//! *Is the recipient the expected one?* Under the right key, an unrelated recipient has a random
+//! message: Σ w_j b′_j b̂_j over the channel bits has mean 0 and variance |w b̂|². With `CODE=LDPC`
+//! b′ is a random code word and its bits are not independent. Any four of them are, and over random
+//! messages the tail is that of the normal distribution (tests of `demodulation.rs` in
+//! `meshmark-core` show both). A message that the key did not whiten is not random; for it the null
+//! hypothesis covers every other message, see [`Null`]. The p-value of the decision is the largest
+//! one.
 
 mod decoys;
 mod rivals;
@@ -23,27 +27,28 @@ use meshmark_core::{
 };
 use serde::Serialize;
 
-/// What the copy of somebody else carries.
+/// The content of a copy with another message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Null {
-    /// A random message: those of recipients are keyed hashes, and the key whitens others.
+    /// A random message: messages of recipients are keyed hashes, and the key whitens the others.
     RandomMessage,
-    /// Any other message, also one that differs in a single bit: messages that were not whitened.
+    /// Any other message, even one that differs in a single bit. This applies to messages without
+    /// whitening.
     AnyOtherMessage,
 }
 
-/// The bits that the code is expected to carry, and what it carries otherwise.
+/// The bits that the code is expected to carry, and the null hypothesis about them.
 #[derive(Debug, Clone)]
 pub struct Expected {
-    /// The bits.
+    /// The expected bits.
     pub carried: Message,
     /// The null hypothesis.
     pub null: Null,
 }
 
 impl Expected {
-    /// Those of a subject under a key.
+    /// Creates the expectation for a subject under a key.
     pub fn new(subject: &Subject, key: &SecretKey) -> Self {
         let null = match subject {
             Subject::Unwhitened(_) => Null::AnyOtherMessage,
@@ -53,25 +58,26 @@ impl Expected {
     }
 }
 
-/// A suspect may be called unmarked when a mark would show this many standard deviations above what
-/// significance needs.
+/// The margin of power, standard deviations. The verdict is "no match" only where the expected
+/// score of a mark exceeds the significance threshold by this much.
 const POWER_MARGIN: f64 = 3.0;
 
-/// The weights of the bits cost this share of the largest score of a recipient, √n for n channel bits.
+/// The share of the largest possible recipient score, √n for n channel bits, that remains with
+/// unequal weights.
 const MOST_OF_ROOT: f64 = 0.99;
 
-/// What a verdict is about: under any other of these the mark is another one.
+/// The subject of a verdict; a change to any of these makes another mark.
 const MARK: &str = "a mark with this key, message, options and reference";
 
-/// The answer.
+/// The answer of a verification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// This mark is in the suspect.
+    /// The suspect carries this mark.
     Match,
-    /// It is not, and it would have shown.
+    /// The suspect does not carry this mark, which would be detectable.
     NoMatch,
-    /// The suspect cannot tell.
+    /// The suspect does not allow an answer.
     Inconclusive,
 }
 
@@ -80,47 +86,48 @@ pub enum Verdict {
 pub struct Decision {
     /// The answer.
     pub verdict: Verdict,
-    /// One sentence why.
+    /// The reason, one sentence.
     pub reason: String,
     /// log₁₀ of the probability of this much evidence under a random key.
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the probability of this much agreement under the null hypothesis about the message.
     pub p_recipient_log10: Option<f64>,
-    /// How many messages were tried.
+    /// Number of messages that were tried.
     pub tried: usize,
 }
 
 impl Decision {
-    /// The larger of the two, times the number of messages tried (Bonferroni).
+    /// Returns log₁₀ of the larger p-value times the number of tried messages (Bonferroni).
     pub fn p_value_log10(&self) -> Option<f64> {
         let larger = self.p_mark_log10?.max(self.p_recipient_log10?);
         Some((larger + (self.tried as f64).log10()).min(0.0))
     }
 
-    /// No answer, for there is nothing to compare the decoded message with.
+    /// Returns an inconclusive decision for the case that no message is expected.
     pub fn without_message() -> Self {
         Self::inconclusive(
             "no expected message was given, so there is nothing to compare the decoded one with".into(),
         )
     }
 
-    /// No answer, for a reason found before demodulation.
+    /// Returns an inconclusive decision for a reason found before demodulation.
     pub fn inconclusive(reason: String) -> Self {
         let (p_mark_log10, p_recipient_log10) = (None, None);
         Decision { verdict: Verdict::Inconclusive, reason, p_mark_log10, p_recipient_log10, tried: 1 }
     }
 }
 
-/// Weighs a demodulation against the expected message, one of those that are tried.
+/// Decides whether a demodulation matches the expected message, one of the `tried` messages.
 pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, significance: f64) -> Decision {
     let message = &expected.carried;
     let each = significance / tried as f64; // Bonferroni
     let bits = message.len();
     let p_mark = survival::normal_log10(found.mark_score(message));
-    // A message of m bits cannot be hit less often than once in 2^m.
+    // A random message of m bits equals the expected one with probability 2⁻ᵐ, so no p-value is
+    // smaller.
     let least = -(bits as f64) * 2f64.log10();
     let p_random = survival::normal_log10(found.recipient_score(message)).max(least);
-    // The score of a message of which every bit is read alike, but for the weights.
+    // This is the score of a message with equally reliable bits, apart from the weights.
     let channel_bits = found.estimate.len() as f64;
     let best = survival::normal_log10(MOST_OF_ROOT * channel_bits.sqrt()).max(least);
     let among_rivals = match expected.null {
@@ -160,7 +167,8 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
     Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient), tried }
 }
 
-/// The key is there, and some other message explains the suspect as well or better.
+/// Decides for a suspect that carries a mark of the key while another message explains it as well
+/// or better.
 fn another_message(found: &Demodulation, each: f64) -> (Verdict, String) {
     let decoded = found.message();
     let standing = rivals::standing(found, &decoded);
@@ -178,17 +186,19 @@ fn another_message(found: &Demodulation, each: f64) -> (Verdict, String) {
     }
 }
 
-/// log₁₀ of the probability of this much evidence for any message at all under a random key; `None` where
-/// nothing was observed to move. Few chips may carry a bit, but the even moments of sums of random signs are
-/// at most those of normal variables, so Chernoff's bound on chi-squared holds for them however few.
+/// Returns log₁₀ of the probability of this much evidence for any message under a random key;
+/// `None` where no displacement was observed. Few chips may carry a bit, but the even moments of
+/// sums of random signs are at most those of normal variables, so Chernoff's bound on chi-squared
+/// holds for any number of chips.
 pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64> {
     let (score, degrees) = found.key_score(chip_rate);
     (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
 }
 
-/// No mark is seen: would a full one be expected to pass both tests, that of the key with a margin?
+/// Decides for a suspect without a visible mark. The verdict is "no match" where a mark of full
+/// amplitude is expected to pass both tests, that of the key with a margin.
 fn unseen(found: &Demodulation, bits: usize, significance: f64) -> (Verdict, String) {
-    let needed = (-2.0 * significance.ln()).sqrt(); // above the normal quantile
+    let needed = (-2.0 * significance.ln()).sqrt(); // this bounds the normal quantile from above
     if (found.estimate.len() as f64).sqrt() <= needed {
         let reason = format!(
             "a message of {bits} bits is too short for its absence to show at a significance of {significance:.1e}: give \
@@ -197,9 +207,9 @@ fn unseen(found: &Demodulation, bits: usize, significance: f64) -> (Verdict, Str
         );
         return (Verdict::Inconclusive, reason);
     }
-    // Were the mark there, b̂ would be near ±1 on the channel bits that are known at all.
+    // With the mark present, b̂ is near ±1 on the channel bits that the suspect determines.
     let known: f64 = found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum();
-    // In the untouched reference nothing moved, so there is no noise either to measure a mark against.
+    // In the unchanged reference no vertex moves, so there is no noise to compare a mark with.
     let nothing_moved = found.expected_sum > 0.0 && found.chip_correlations.iter().all(|a| *a == 0.0);
     let visible = nothing_moved || found.expected_mark_score() > needed + POWER_MARGIN;
     match visible && known.sqrt() > needed {

@@ -1,28 +1,31 @@
 //! Rivals: other messages that may explain a suspect as well as the expected one.
 //!
-//! The bits of a recipient, and those of a whitened message, are as good as random, and no other recipient has nearly
-//! the same. A message that was not whitened may be a serial number, and its neighbours differ in one bit. So the
-//! null hypothesis is *any other message*: the copy carries a message that differs in at least one bit. Where the two
-//! differ the evidence then has the same strength as elsewhere, with the other sign.
+//! The bits of a recipient and of a whitened message are practically random, and no other recipient
+//! has nearly the same bits. A message without whitening may be a serial number, whose neighbours
+//! differ in one bit. For it the null hypothesis is *any other message*: the copy carries a message
+//! that differs in at least one bit. On the differing bits the evidence then has the usual strength
+//! and the opposite sign.
 
 use super::survival;
 use meshmark_core::{demodulation::Demodulation, message::Message};
 
-/// The median of the absolute deviations of normal variables, in standard deviations, inverted.
+/// Normal standard deviation per median absolute deviation.
 const NORMAL_OF_MEDIAN: f64 = 1.4826;
-/// So many standard deviations below the rest, bits do not belong to the same copy.
+/// Bits this many standard deviations below the rest do not belong to the same copy.
 const MIXED_DEVIATIONS: f64 = 6.0;
 
-/// How the expected message stands against all others.
+/// The expected message compared with all others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
-    /// log₁₀ of the probability that a copy with the most similar other message speaks so much for the expected one.
+    /// log₁₀ of the probability that a copy with the most similar other message gives this much
+    /// evidence for the expected one.
     pub p_log10: f64,
     /// Whether some bits are much weaker than the rest, as in an average of copies with other messages.
     pub is_mixed: bool,
 }
 
-/// Compares the expected bits with those that differ from them in one bit, and with the decoded ones.
+/// Compares the expected message with those that differ from it in one bit, and with the decoded
+/// message.
 pub fn standing(found: &Demodulation, expected: &Message) -> Standing {
     let signs = found.code.encode(expected);
     let agreement: Vec<f64> = signs.iter().zip(&found.estimate).map(|(sign, b)| sign * b).collect();
@@ -59,7 +62,8 @@ mod tests {
         Message::from_hex(&format!("{number:032x}")).unwrap()
     }
 
-    /// What the mean of copies with these messages shows, with a little noise that is the same every time.
+    /// Returns the demodulation of the mean of copies with these messages, with a little
+    /// deterministic noise.
     fn copies(code: Code, numbers: &[u32], noise: f64) -> Demodulation {
         let words: Vec<Vec<f64>> = numbers.iter().map(|n| code.encode(&serial(*n))).collect();
         let mean = |j: usize| words.iter().map(|word| word[j]).sum::<f64>() / words.len() as f64;

@@ -1,4 +1,5 @@
-//! Survival functions as logarithms: how rare a score is, never minus infinity.
+//! Survival functions as logarithms: the probability of a larger score, finite even where it
+//! underflows.
 
 use statrs::function::{
     erf::erfc,
@@ -6,18 +7,20 @@ use statrs::function::{
 };
 use std::f64::consts::{LN_10, PI, SQRT_2};
 
-/// log₁₀ of the probability that a standard normal variable exceeds `score`; finite for every finite score.
+/// Returns log₁₀ of the probability that a standard normal variable exceeds `score`; it is finite
+/// for every finite score.
 pub fn normal_log10(score: f64) -> f64 {
     if score < 30.0 {
         return (erfc(score / SQRT_2) / 2.0).log10();
     }
-    // Abramowitz and Stegun 26.2.12, two terms; erfc underflows from 38 on.
+    // Two terms of Abramowitz and Stegun 26.2.12; erfc underflows from 38 on.
     let z2 = score * score;
     let ln = -z2 / 2.0 - (score * (2.0 * PI).sqrt()).ln() + (-1.0 / z2 + 3.0 / (z2 * z2)).ln_1p();
     ln / LN_10
 }
 
-/// log₁₀ of the probability that a chi-squared variable with `degrees` degrees of freedom exceeds `score`.
+/// Returns log₁₀ of the probability that a chi-squared variable with `degrees` degrees of freedom
+/// exceeds `score`.
 pub fn chi_squared_log10(score: f64, degrees: usize) -> f64 {
     let (a, x) = (degrees as f64 / 2.0, score / 2.0);
     if x <= 0.0 {
@@ -29,8 +32,8 @@ pub fn chi_squared_log10(score: f64, degrees: usize) -> f64 {
     (a * x.ln() - x - ln_gamma(a) + gamma_fraction(a, x).ln()) / LN_10
 }
 
-/// Γ(a, x) eˣ x⁻ᵃ for x > a + 1 by its continued fraction (Abramowitz and Stegun 6.5.31), evaluated
-/// as by Lentz 1976.
+/// Returns Γ(a, x) eˣ x⁻ᵃ for x > a + 1 from its continued fraction (Abramowitz and Stegun 6.5.31),
+/// evaluated by the method of Lentz 1976.
 fn gamma_fraction(a: f64, x: f64) -> f64 {
     let mut b = x + 1.0 - a;
     let mut c = f64::INFINITY;
@@ -58,7 +61,7 @@ mod tests {
         for (score, p) in [(0.0, 0.5), (1.0, 0.158_655_25), (5.0, 2.866_516e-7), (-2.0, 0.977_249_87)] {
             assert!((normal_log10(score) - f64::log10(p)).abs() < 1e-6, "{score}");
         }
-        // Continuous where the formula changes, and finite far out.
+        // The function is continuous where the formula changes, and finite in the far tail.
         assert!((normal_log10(29.999_999_9) - normal_log10(30.0)).abs() < 1e-4);
         assert!((normal_log10(100.0) + 2173.87).abs() < 0.01, "{}", normal_log10(100.0));
     }
@@ -75,7 +78,7 @@ mod tests {
 
     #[test]
     fn the_chi_squared_one_is_the_closed_form_for_an_even_number_of_degrees() {
-        // e⁻ˣ Σ_{i<k} xⁱ / i!, summed as logarithms.
+        // This is e⁻ˣ Σ_{i<k} xⁱ / i!, summed as logarithms.
         let closed = |score: f64, degrees: usize| {
             let x = score / 2.0;
             let term = |i: usize| i as f64 * x.ln() - ln_gamma(i as f64 + 1.0);

@@ -1,19 +1,19 @@
-//! Matching that also looks at what a vertex is joined to: where several suspect vertices are near a
-//! reference vertex, its neighbours along rings and lines tell which of them it became.
+//! Matching with neighbours along rings and lines: where several suspect vertices are near a
+//! reference vertex, the matched neighbours of each decide among them.
 
 use super::matches::Matches;
 use rayon::prelude::*;
 
-/// Which vertices rings and lines join, as lists of neighbours one after the other.
+/// The graph of vertices that rings and lines join, as concatenated lists of neighbours.
 #[derive(Debug, Clone)]
 pub struct Graph {
-    /// Where the neighbours of vertex v start and, at v + 1, end.
+    /// Index of the first neighbour of vertex v; entry v + 1 is the end of its list.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
 }
 
 impl Graph {
-    /// `vertices`: how many there are; `segments`: pairs of them, each once.
+    /// Builds the graph of `vertices` vertices from segments, each pair of indices once.
     pub fn new(vertices: usize, segments: &[[u32; 2]]) -> Self {
         let mut starts = vec![0u32; vertices + 1];
         for v in segments.as_flattened() {
@@ -39,28 +39,29 @@ impl Graph {
     }
 }
 
-/// A suspect vertex that a reference vertex may have become.
+/// A suspect vertex that may correspond to a reference vertex.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
     /// Canonical index in the reference.
     pub reference: u32,
     /// Canonical index in the suspect.
     pub suspect: u32,
-    /// How far apart they are, metres.
+    /// Distance between the two, metres.
     pub distance_m: f64,
 }
 
-/// What one neighbour that is matched to a neighbour is worth, as a log-likelihood ratio: in real maps under
-/// ±50 cm of noise a right candidate has such a neighbour some twenty times as often as a wrong one.
+/// The log-likelihood ratio of one neighbour that is matched to a neighbour. In real maps under ±50
+/// cm of noise a right candidate has such a neighbour about twenty times as often as a wrong one.
 const NEIGHBOUR: f64 = 3.0;
-/// After so many rounds no match changes any more, but for a few that alternate.
+/// After this many rounds no match changes any more, apart from a few that alternate.
 const ROUNDS: usize = 4;
-/// Displacements are not trusted to be smaller than this, metres per axis: about what a mark does.
+/// Lower bound of the spread of displacements, metres per axis: about the amplitude of a mark.
 const LEAST_SPREAD_M: f64 = 0.1;
 
-/// Starts from `nearest` and chooses among `candidates` (sorted by reference) by distance and by how many
-/// neighbours of the reference vertex are matched to neighbours of the candidate (relaxation labelling,
-/// Rosenfeld, Hummel and Zucker 1976, with hard labels). One suspect vertex serves one reference vertex.
+/// Chooses among `candidates` (sorted by reference), starting from `nearest`. The criteria are the
+/// distance and the number of neighbours of the reference vertex that are matched to neighbours of
+/// the candidate (relaxation labelling, Rosenfeld, Hummel and Zucker 1976, with hard labels). Each
+/// suspect vertex matches at most one reference vertex.
 pub fn choose(nearest: Matches, candidates: &[Candidate], reference: &Graph, suspect: &Graph) -> Matches {
     let spread2 = spread2(&nearest, candidates);
     let mut matches = nearest;
@@ -84,7 +85,7 @@ pub fn choose(nearest: Matches, candidates: &[Candidate], reference: &Graph, sus
     matches
 }
 
-/// The variance per axis of the displacements of matched vertices, square metres.
+/// Returns the variance per axis of the displacements of matched vertices, square metres.
 fn spread2(nearest: &Matches, candidates: &[Candidate]) -> f64 {
     let chosen = |c: &&Candidate| nearest.suspect_of[c.reference as usize] == Some(c.suspect);
     let sum: f64 = candidates.iter().filter(chosen).map(|c| c.distance_m.powi(2)).sum();

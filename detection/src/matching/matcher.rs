@@ -1,4 +1,4 @@
-//! Nearest neighbours, mutually, within the radius t (paper, section 3.5).
+//! Mutual nearest neighbours within the radius t (paper, section 3.5).
 
 use super::{
     joined::{self, Candidate, Graph},
@@ -12,7 +12,8 @@ use rstar::{AABB, PointDistance, RTree, RTreeObject};
 pub struct Matcher<'a> {
     reference: &'a [[f64; 2]],
     ground: &'a Ground,
-    /// Subtracted from coordinates, then x is multiplied by `x_scale`: the plane distances are taken in.
+    /// The plane in which distances are measured: the origin is subtracted from coordinates, then
+    /// `x_scale` multiplies x.
     origin: [f64; 2],
     x_scale: f64,
     tree: RTree<Node>,
@@ -38,7 +39,7 @@ impl PointDistance for Node {
 }
 
 impl<'a> Matcher<'a> {
-    /// `reference`: vertices in CRS units; `centre`: the middle of the map.
+    /// Indexes the vertices of a reference, CRS units; `centre` is the middle of the map.
     pub fn new(reference: &'a [[f64; 2]], ground: &'a Ground, centre: [f64; 2]) -> Self {
         let mut matcher = Matcher {
             reference,
@@ -51,7 +52,8 @@ impl<'a> Matcher<'a> {
         matcher
     }
 
-    /// Matches every reference vertex. `suspect`: vertices in the reference's CRS; `radius_m`: metres.
+    /// Matches every reference vertex. `suspect` are vertices in the CRS of the reference;
+    /// `radius_m` is in metres.
     pub fn all(&self, suspect: &[[f64; 2]], radius_m: f64) -> Matches {
         self.every(1, suspect, radius_m)
     }
@@ -61,8 +63,8 @@ impl<'a> Matcher<'a> {
         self.mutual(step, suspect, &self.tree_of(suspect), radius_m)
     }
 
-    /// Matches every reference vertex, and where several suspect vertices are near chooses by what they are
-    /// joined to. `graphs`: of the reference and of the suspect.
+    /// Matches every reference vertex. Where several suspect vertices are near, their neighbours
+    /// decide. `graphs` are those of the reference and of the suspect.
     pub fn joined(&self, suspect: &[[f64; 2]], radius_m: f64, graphs: [&Graph; 2]) -> Matches {
         let tree = self.tree_of(suspect);
         let nearest = self.mutual(1, suspect, &tree, radius_m);
@@ -97,13 +99,15 @@ impl<'a> Matcher<'a> {
         [(x - self.origin[0]) * self.x_scale, y - self.origin[1]]
     }
 
-    /// The point of `tree` nearest to `from` on the ground, within `radius_m`; ties go to the smaller index.
+    /// Returns the point of `tree` nearest to `from` on the ground, within `radius_m`. The smaller
+    /// index wins ties.
     fn nearest(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> Option<u32> {
         let within = self.within(tree, from, radius_m);
         within.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, index)| index)
     }
 
-    /// The points of `tree` within `radius_m` of `from` on the ground: distance in metres and index.
+    /// Returns the points of `tree` within `radius_m` of `from` on the ground, each as its distance
+    /// in metres and its index.
     fn within(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> impl Iterator<Item = (f64, u32)> {
         let [mx, my] = self.ground.metres_per_unit(from);
         let scale = [mx / self.x_scale, my]; // metres per unit of the plane
@@ -136,7 +140,7 @@ mod tests {
     #[test]
     fn the_radius_is_in_metres_at_every_latitude() {
         let ground = Ground::WGS84;
-        // Two thirds of a metre east of points on the equator and at 70° N.
+        // The points are two thirds of a metre east of points on the equator and at 70° N.
         let reference = [[10.0, 0.0], [10.0, 70.0]];
         let east = |p: [f64; 2]| [p[0] + 2.0 / 3.0 / ground.metres_per_unit(p)[0], p[1]];
         let matcher = Matcher::new(&reference, &ground, [10.0, 35.0]);

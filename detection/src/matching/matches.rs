@@ -1,19 +1,19 @@
-//! Which suspect vertex is which reference vertex.
+//! The correspondence of suspect vertices and reference vertices.
 
 use meshmark_core::ground::Ground;
 
-/// The suspect vertex of every reference vertex, and how many have one.
+/// The suspect vertex of every reference vertex, and the number of matches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matches {
-    /// For every reference vertex the index of its suspect vertex.
+    /// The index of the suspect vertex of every reference vertex.
     pub suspect_of: Vec<Option<u32>>,
-    /// How many reference vertices have one.
+    /// Number of reference vertices with a match.
     pub count: usize,
 }
 
 impl Matches {
-    /// The displacement of every reference vertex, metres; `None` where no suspect vertex matches. `moved` are the
-    /// suspect's vertices in reference coordinates.
+    /// Returns the displacement of every reference vertex, metres; `None` where no suspect vertex
+    /// matches. `moved` are the vertices of the suspect in reference coordinates.
     pub fn displacements_m(
         &self,
         reference: &[[f64; 2]],
@@ -24,7 +24,7 @@ impl Matches {
         pairs.map(|(r, s)| s.map(|s| ground.metres_between(*r, moved[s as usize]))).collect()
     }
 
-    /// Drops the matches of other reference vertices.
+    /// Drops the matches of all reference vertices that `wanted` rejects.
     pub fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         for (vertex, suspect) in self.suspect_of.iter_mut().enumerate() {
             *suspect = suspect.filter(|_| wanted(vertex));

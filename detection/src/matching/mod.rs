@@ -1,4 +1,4 @@
-//! Matching: which suspect vertex is which reference vertex (paper, section 3.5).
+//! Matching: the correspondence of suspect and reference vertices (paper, section 3.5).
 
 mod chance;
 mod joined;

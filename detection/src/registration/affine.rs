@@ -10,16 +10,17 @@ pub struct Affine {
 }
 
 impl Affine {
-    /// Leaves every point where it is.
+    /// The map that leaves every point in its place.
     pub const IDENTITY: Affine = Affine { coefficients: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0] };
 
-    /// Where `p` goes.
+    /// Returns the image of `p`.
     pub fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [a, b, c, d, e, f] = self.coefficients;
         [a * x + b * y + c, d * x + e * y + f]
     }
 
-    /// The affine map that gives the points zero mean and unit covariance; the identity when they are on a line.
+    /// Returns the affine map that gives the points zero mean and unit covariance; the identity
+    /// when they lie on a line.
     pub fn whitening(points: &[[f64; 2]]) -> Self {
         let Some(c) = weighted_mean(points, &vec![1.0; points.len()]) else { return Self::IDENTITY };
         let mean = |f: &dyn Fn(f64, f64) -> f64| {
@@ -35,8 +36,8 @@ impl Affine {
         Affine { coefficients: [a, 0.0, -a * c[0], d, e, -d * c[0] - e * c[1]] }
     }
 
-    /// The affine map that takes `from` to `to` with the least weighted sum of squares; `None` when
-    /// the points do not span a plane. `weights` has one entry for every pair.
+    /// Returns the affine map from `from` to `to` with the least weighted sum of squares; `None`
+    /// when the points do not span a plane. `weights` has one entry for every pair.
     pub fn fit(from: &[[f64; 2]], to: &[[f64; 2]], weights: &[f64]) -> Option<Self> {
         let centre = weighted_mean(from, weights)?;
         let spread = from.iter().flat_map(|p| [(p[0] - centre[0]).abs(), (p[1] - centre[1]).abs()]);
@@ -44,7 +45,8 @@ impl Affine {
         if scale == 0.0 || !scale.is_finite() {
             return None;
         }
-        // Centred and scaled to ±1: coordinates of 10⁷ would square the condition number away.
+        // Coordinates are centred and scaled to ±1, as those of 10⁷ give a normal matrix of
+        // excessive condition number.
         let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Matrix3x2::<f64>::zeros());
         for ((p, q), &w) in from.iter().zip(to).zip(weights) {
             let row = [(p[0] - centre[0]) / scale, (p[1] - centre[1]) / scale, 1.0];
@@ -69,16 +71,18 @@ impl Affine {
         Some(Affine { coefficients: [a, b, c, d, e, f] })
     }
 
-    /// The affine map with the least sum of distances, not of their squares: a few wrong pairs do
-    /// not pull it (paper, section 3.5). Iteratively reweighted least squares (Weiszfeld 1937); distances
-    /// below `least_distance` weigh alike. Distances are in the units of `to`.
+    /// Returns the affine map with the least sum of distances instead of squares, on which a few
+    /// wrong pairs have little influence (paper, section 3.5). The method is iteratively reweighted
+    /// least squares (Weiszfeld 1937); distances below `least_distance` have equal weight.
+    /// Distances are in the units of `to`.
     pub fn fit_robustly(from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
         let fit = |weights: &[f64]| Self::fit(from, to, weights);
         least_distances(from, to, least_distance, fit, |affine, p| affine.apply(p))
     }
 }
 
-/// Iteratively reweighted least squares: `fit` solves with given weights, `apply` maps a point by a solution.
+/// Minimises the sum of distances by iteratively reweighted least squares: `fit` solves with given
+/// weights, `apply` maps a point by a solution.
 pub(crate) fn least_distances<T>(
     from: &[[f64; 2]],
     to: &[[f64; 2]],

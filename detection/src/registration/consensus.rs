@@ -1,4 +1,4 @@
-//! Consensus: the affine map that most pairs of places agree on, however many are wrong.
+//! Consensus: the affine map that most pairs of places agree on, whatever the share of wrong pairs.
 
 use super::affine::Affine;
 use rand_chacha::{
@@ -6,8 +6,9 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-/// The affine map under which most pairs are within `metres` (random sample consensus, Fischler and
-/// Bolles 1981, scored as by Torr and Zisserman 2000), then the robust fit to those.
+/// Returns the affine map under which most pairs are within `metres` (random sample consensus,
+/// Fischler and Bolles 1981, scored as by Torr and Zisserman 2000), refined by a robust fit to
+/// those pairs, and their number.
 pub fn consensus(pairs: &[[[f64; 2]; 2]], unit: [f64; 2], metres: f64) -> Option<(Affine, usize)> {
     if pairs.len() < 3 {
         return None;

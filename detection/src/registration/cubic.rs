@@ -1,5 +1,5 @@
-//! Cubic polynomials: what is left of a smooth distortion (an unknown projection, a stretched scan) when the best
-//! affine map is taken off.
+//! Cubic polynomials: the remainder of a smooth distortion (an unknown projection, a stretched
+//! scan) after the best affine map.
 
 use super::affine::{Affine, least_distances};
 use nalgebra::{SMatrix, SVector};
@@ -21,12 +21,12 @@ pub struct Cubic {
     pub y: [f64; TERMS],
 }
 
-/// An affine map and perhaps a cubic polynomial after it.
+/// An affine map, followed by an optional cubic polynomial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transform {
     /// The linear part.
     pub affine: Affine,
-    /// What it leaves.
+    /// The nonlinear remainder.
     pub cubic: Option<Cubic>,
 }
 
@@ -37,7 +37,7 @@ impl From<Affine> for Transform {
 }
 
 impl Transform {
-    /// Where `p` goes.
+    /// Returns the image of `p`.
     pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
         let p = self.affine.apply(p);
         self.cubic.map_or(p, |cubic| cubic.apply(p))
@@ -45,12 +45,13 @@ impl Transform {
 }
 
 impl Cubic {
-    /// Moves nothing. The frame holds the map: its centre and half of its longer side.
+    /// Returns the polynomial that leaves every point in its place. Its frame encloses the map: the
+    /// centre and half of the longer side.
     pub fn zero(centre: [f64; 2], scale: f64) -> Self {
         Cubic { centre, scale, x: [0.0; TERMS], y: [0.0; TERMS] }
     }
 
-    /// Where `p` goes.
+    /// Returns the image of `p`.
     pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
         let terms = self.terms(p);
         let shift = |c: &[f64; TERMS]| c.iter().zip(terms).map(|(c, t)| c * t).sum::<f64>();
@@ -62,8 +63,9 @@ impl Cubic {
         [1.0, u, v, u * u, u * v, v * v, u * u * u, u * u * v, u * v * v, v * v * v]
     }
 
-    /// The polynomial in the frame of `self` that takes `from` to `to` with the least sum of distances;
-    /// `None` when the points do not determine it. `least_distance` as in [`Affine::fit_robustly`].
+    /// Returns the polynomial in the frame of `self` that maps `from` to `to` with the least sum of
+    /// distances; `None` when the points do not determine it. `least_distance` has the meaning it
+    /// has in [`Affine::fit_robustly`].
     pub fn fit_robustly(&self, from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
         let fit = |weights: &[f64]| self.fit(from, to, weights);
         least_distances(from, to, least_distance, fit, |cubic, p| cubic.apply(p))
@@ -94,7 +96,8 @@ impl Cubic {
 mod tests {
     use super::*;
 
-    /// 20 × 20 points, 50 m apart, and where a cubic polynomial of up to tens of metres takes them.
+    /// Returns 20 × 20 points, 50 m apart, and their images under a cubic polynomial of up to tens
+    /// of metres.
     fn bent() -> (Cubic, Vec<[f64; 2]>, Vec<[f64; 2]>) {
         let truth = Cubic {
             x: [3.0, -1.0, 2.0, 12.0, -5.0, 4.0, 8.0, 0.5, -3.0, 1.0],

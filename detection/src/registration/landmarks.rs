@@ -1,13 +1,13 @@
-//! Landmarks: features of two maps that have the same attribute values.
+//! Landmarks: features of two maps that have equal attribute values.
 
 use meshmark_core::map_data::{Dimension, Label};
 use std::collections::HashMap;
 
-/// Lines are used when there are fewer landmarks without them.
+/// With fewer landmarks than this, those of lines are used too.
 const FEW_LANDMARKS: usize = 8;
 
-/// Pairs of places (suspect, reference) of features that share an attribute value which occurs once
-/// in either map.
+/// Returns pairs of places (suspect, reference) of features that share an attribute value which
+/// occurs once in either map.
 pub fn pairs(reference: &[Label], suspect: &[Label]) -> Vec<[[f64; 2]; 2]> {
     let (reference, suspect) = (unique(reference), unique(suspect));
     let mut both: Vec<(&Label, &Label)> =
@@ -30,7 +30,7 @@ fn unique(labels: &[Label]) -> HashMap<&str, &Label> {
     let mut seen: HashMap<&str, Option<&Label>> = HashMap::new();
     for label in labels {
         let entry = seen.entry(&label.value).or_insert(Some(label));
-        // The same value in two fields of one feature is still unique.
+        // An equal value in two fields of one feature is still unique.
         if entry.is_some_and(|first| first.point != label.point) {
             *entry = None;
         }

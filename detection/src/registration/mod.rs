@@ -1,9 +1,10 @@
-//! Registration: the map that brings a suspect back onto the reference (paper, section 3.5): an affine one, and
-//! where that leaves a smooth distortion, a cubic polynomial.
+//! Registration: the transformation of a suspect onto the reference (paper, section 3.5). It is an
+//! affine map, followed by a cubic polynomial where a smooth distortion remains.
 //!
-//! Starting points are the identity, landmarks (features with the same attribute values) and geometry
-//! (features of the same shape, then the same arrangement of neighbouring vertices). Each is refined on matched
-//! vertices, and the one under which most vertices match wins. Nothing here knows a key.
+//! Starting points are the identity, landmarks (features with equal attribute values) and geometry
+//! (features of equal shape, then equal arrangements of neighbouring vertices). Each start is
+//! refined on matched vertices, and the one with most matched vertices wins. Registration uses no
+//! key.
 
 mod affine;
 mod consensus;

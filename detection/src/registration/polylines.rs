@@ -1,25 +1,27 @@
-//! Recognising features by their form, for maps without usable attributes.
+//! Recognition of features by their shape, for maps without usable attributes.
 //!
-//! The areas of the triangles that neighbouring vertices of a ring make, over the area of the ring, do not
-//! change under an affine map, mirrored or not. Rings with the same sequence of them are the same
-//! feature. Of a line, which has no area, they are taken over their own sum.
+//! The triangles of neighbouring vertices of a ring have areas whose ratio to the area of the ring
+//! is invariant under affine maps, reflections included. Rings with equal sequences of these ratios
+//! are the same feature. A line has no area, so the sum of the triangles replaces it.
 
 use meshmark_core::map_data::Polyline;
 
-/// Polylines of a map that are compared: those with the most vertices, which are the easiest to tell apart.
+/// Number of polylines of a map that are compared: those with the most vertices, which differ most.
 const MOST_POLYLINES: usize = 3000;
-/// A pair counts when the next best is this many times further away (Lowe 2004 has the idea).
+/// A pair counts when the second-best one is this many times further away (idea of Lowe 2004).
 const DISTINCT: f64 = 2.5;
-/// Sums of squares below this are no difference: row houses are not told apart by rounding.
+/// Sums of squares below this count as equal, so that rounding does not distinguish row houses.
 const SAME: f64 = 1e-6;
-/// Longer rings and lines are not compared: it takes the square of their vertices.
+/// Longer rings and lines are skipped, as the effort grows with the square of the number of
+/// vertices.
 const MOST_VERTICES: usize = 1000;
-/// Vertices that turn the line less than this share of its area are left out: others may add or drop them.
+/// Vertices whose triangle has less than this share of the area are left out, as edits may add or
+/// drop them.
 const STRAIGHT: f64 = 2e-3;
-/// With fewer vertices than this left a ring is like any other.
+/// A ring of fewer remaining vertices is not distinctive.
 const LEAST_VERTICES: usize = Polyline::LEAST_VERTICES;
 
-/// Pairs of places (suspect, reference) of polylines that are most likely the same.
+/// Returns pairs of places (suspect, reference) of polylines that most likely correspond.
 pub fn pairs(reference: &[Polyline], suspect: &[Polyline]) -> Vec<[[f64; 2]; 2]> {
     let (ours, theirs) = (signatures(reference), signatures(suspect));
     let forward = best(&theirs, &ours);
@@ -31,18 +33,19 @@ pub fn pairs(reference: &[Polyline], suspect: &[Polyline]) -> Vec<[[f64; 2]; 2]>
     mutual.collect()
 }
 
-/// What is left of a polyline under an affine map, and its place.
+/// The affine invariants of a polyline, and its place.
 struct Signature {
     closed: bool,
-    /// One share of the area for each vertex that matters.
+    /// One share of the area for each vertex that is kept.
     areas: Vec<f64>,
-    /// Mean of the vertices that matter.
+    /// Mean of these vertices, CRS units.
     place: [f64; 2],
 }
 
 fn signatures(polylines: &[Polyline]) -> Vec<Signature> {
     let mut all: Vec<Signature> = polylines.iter().filter_map(signature).collect();
-    // Stable: with equal counts the order of the file decides, and that only matters beyond the limit.
+    // A stable sort keeps the order of the file among equal counts, which matters only beyond the
+    // limit.
     all.sort_by_key(|s| std::cmp::Reverse(s.areas.len()));
     all.truncate(MOST_POLYLINES);
     all
@@ -54,7 +57,8 @@ fn signature(polyline: &Polyline) -> Option<Signature> {
     }
     let mut vertices = polyline.vertices.clone();
     let (mut areas, mut total) = areas(&vertices, polyline.closed);
-    // The straightest vertex first, for each that goes changes its neighbours (Visvalingam, Whyatt 1993).
+    // The straightest vertex goes first, as each removal changes its neighbours (Visvalingam,
+    // Whyatt 1993).
     while vertices.len() >= LEAST_VERTICES {
         let inner = (0..vertices.len()).filter(|&i| !is_end(i, vertices.len(), polyline.closed));
         let straightest = inner.min_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()))?;
@@ -77,8 +81,8 @@ fn is_end(i: usize, count: usize, closed: bool) -> bool {
     !closed && (i == 0 || i + 1 == count)
 }
 
-/// Twice the signed area of the triangle at every vertex (0 at the ends of a line), and that of the whole:
-/// of the ring, or the sum over a line.
+/// Returns twice the signed area of the triangle at every vertex (0 at the ends of a line) and the
+/// total: that of the ring, or the sum over a line.
 fn areas(vertices: &[[f64; 2]], closed: bool) -> (Vec<f64>, f64) {
     let n = vertices.len();
     let cross =
@@ -95,7 +99,7 @@ fn areas(vertices: &[[f64; 2]], closed: bool) -> (Vec<f64>, f64) {
     (areas, whole)
 }
 
-/// For each of `these` the one of `those` that is distinctly the most similar.
+/// Returns for each signature of `these` the distinctly most similar one of `those`.
 fn best(these: &[Signature], those: &[Signature]) -> Vec<Option<usize>> {
     use rayon::prelude::*;
     let find = |a: &Signature| {
@@ -118,8 +122,8 @@ fn best(these: &[Signature], those: &[Signature]) -> Vec<Option<usize>> {
     these.par_iter().map(find).collect()
 }
 
-/// The least sum of squares over all ways to lay one sequence on the other: any start and direction for
-/// rings, either direction and sign for lines. Gives up beyond `limit`.
+/// Returns the least sum of squares over all alignments of two sequences: any start and direction
+/// for rings, either direction and sign for lines. The search stops beyond `limit`.
 fn distance(a: &Signature, b: &Signature, limit: f64) -> f64 {
     let n = a.areas.len();
     let starts = if a.closed { n } else { 1 };
@@ -148,7 +152,7 @@ mod tests {
     use super::*;
     use crate::registration::Affine;
 
-    /// A ring of 8 vertices that is like no other seed's.
+    /// Returns a ring of 8 vertices that differs for every seed.
     fn ring(seed: u64) -> Polyline {
         let noise =
             |i: u64| ((seed * 31 + i).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);

@@ -1,12 +1,12 @@
-//! Brings suspects onto one reference.
+//! The reference side of a registration.
 
 use crate::matching::Matcher;
 use meshmark_core::{ground::Ground, map_data::MapData};
 
-/// Reference vertices used while refining; more would not make it better.
+/// Number of reference vertices used for refinement; more do not improve it.
 const SAMPLE: usize = 20_000;
 
-/// A reference that suspects are brought onto.
+/// A reference onto which suspects are registered.
 pub struct Registrar<'a> {
     pub(super) matcher: Matcher<'a>,
     pub(super) reference: &'a MapData,
@@ -15,24 +15,24 @@ pub struct Registrar<'a> {
 }
 
 impl<'a> Registrar<'a> {
-    /// `radius_m` is the matching radius t.
+    /// Prepares a reference; `radius_m` is the matching radius t, metres.
     pub fn new(reference: &'a MapData, ground: &'a Ground, radius_m: f64) -> Self {
         let vertices = &reference.vertices;
         let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
         Registrar { matcher, reference, ground, radius_m }
     }
 
-    /// Metres per CRS unit in the middle of the reference.
+    /// Returns the metres per CRS unit in the middle of the reference.
     pub(super) fn unit(&self) -> [f64; 2] {
         self.ground.metres_per_unit(self.reference.vertices.centre())
     }
 
-    /// A centimetre in CRS units.
+    /// Returns a centimetre in CRS units.
     pub(super) fn centimetre(&self) -> f64 {
         0.01 / self.unit()[0].max(self.unit()[1])
     }
 
-    /// Every how many-th reference vertex is used while refining.
+    /// Returns the step of the sample: refinement uses every `step`-th reference vertex.
     pub(super) fn step(&self) -> usize {
         self.reference.vertices.len().div_ceil(SAMPLE).max(1)
     }

@@ -1,4 +1,4 @@
-//! What a registration found.
+//! The result of a registration.
 
 use super::{
     affine::Affine,
@@ -7,39 +7,41 @@ use super::{
 use meshmark_core::counted;
 use serde::Serialize;
 
-/// The share of the smaller map's vertices that is most of them: the search ends.
+/// Share of the vertices of the smaller map above which the search ends.
 const AGREE: f64 = 0.5;
-/// The share of the smaller map's vertices that chance does not reach: what is costly is not tried.
+/// Share of the vertices of the smaller map that chance does not reach; above it costly starts are
+/// skipped.
 const SOME_AGREE: f64 = 0.2;
 
-/// How a suspect was brought onto the reference.
+/// The transformation of a suspect onto the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Registration {
-    /// "identity", "landmarks" or "geometry": where the search started.
+    /// Start of the search: "identity", "landmarks" or "geometry".
     pub method: &'static str,
-    /// What the suspect's numbers were taken for, where its CRS is missing or wrong.
+    /// The CRS assumed for the coordinates of the suspect, where its own is missing or wrong.
     pub read_as: Option<ReadAs>,
-    /// Suspect (in the reference's CRS) to reference coordinates: x′ = a x + b y + c, y′ = d x + e y + f,
-    /// CRS units.
+    /// Coefficients from the coordinates of the suspect, in the CRS of the reference, to those of
+    /// the reference: x′ = a x + b y + c, y′ = d x + e y + f, CRS units.
     pub affine: [f64; 6],
-    /// The polynomial that comes after the affine map; null when that is enough.
+    /// The polynomial applied after the affine map; null where the affine map suffices.
     pub polynomial: Option<Cubic>,
-    /// Pairs of features that agree with the result; 0 when none were needed.
+    /// Number of feature pairs that agree with the result; 0 where none were needed.
     pub landmarks: usize,
-    /// Root mean square distance of matched vertices after it, metres; null when none matched.
+    /// Root mean square distance of matched vertices after registration, metres; null when none
+    /// matched.
     pub rms_m: Option<f64>,
-    /// Matched vertices, of a sample.
+    /// Number of matched vertices in a sample.
     #[serde(skip)]
     pub matched: usize,
-    /// The same as a share of the smaller map.
+    /// The same number as a share of the smaller map.
     #[serde(skip)]
     pub share: f64,
 }
 
-/// What the numbers of a map were taken for.
+/// The CRS assumed for a map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadAs {
-    /// "EPSG:3857", or WKT.
+    /// The CRS: "EPSG:3857", or WKT.
     pub crs: String,
     /// Whether x and y were exchanged first.
     pub axes_swapped: bool,
@@ -53,13 +55,13 @@ impl std::fmt::Display for ReadAs {
 }
 
 impl Registration {
-    /// The suspect's vertices in reference coordinates.
+    /// Returns the vertices of the suspect in reference coordinates.
     pub fn apply(&self, suspect: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let transform = Transform { affine: Affine { coefficients: self.affine }, cubic: self.polynomial };
         suspect.iter().map(|p| transform.apply(*p)).collect()
     }
 
-    /// What was done, for a person.
+    /// Describes the registration in text.
     pub fn to_text(&self) -> String {
         let read_as = self.read_as.as_ref().map_or(String::new(), |read_as| format!(", read as {read_as}"));
         let landmarks = match self.landmarks {
@@ -71,12 +73,12 @@ impl Registration {
         format!("{}{read_as}{landmarks}{polynomial}{rms}", self.method)
     }
 
-    /// Whether most vertices match: there is nothing better to search for.
+    /// Returns whether so many vertices match that the search can end.
     pub fn agrees(&self) -> bool {
         self.share >= AGREE
     }
 
-    /// Whether more vertices match than chance makes.
+    /// Returns whether more vertices match than by chance.
     pub fn agrees_in_part(&self) -> bool {
         self.share >= SOME_AGREE
     }

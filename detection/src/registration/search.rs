@@ -1,4 +1,4 @@
-//! The search of a registration: ways to start, and how a start is improved.
+//! The search of a registration: its starts and their refinement.
 
 use super::{
     affine::Affine,
@@ -12,37 +12,37 @@ use super::{
 use crate::matching::{LEAST_MATCHED, is_chance, out_of_place};
 use meshmark_core::{map_data::MapData, vertices::VertexTable};
 
-/// With more matched vertices than this share there is no distortion to follow.
+/// Above this share of matched vertices there is no distortion to follow.
 const ALMOST_ALL: f64 = 0.9;
-/// A polynomial is kept when it matches this many times as many vertices as the affine map, and
-/// [`LEAST_MATCHED`] more: its 20 coefficients find some anywhere.
+/// A polynomial is kept when it matches this many times the vertices of the affine map, and
+/// [`LEAST_MATCHED`] more, as its 20 coefficients match some vertices anywhere.
 const CLEARLY_MORE: f64 = 1.1;
 /// Rounds of least squares at the end, which may lose a few of the pairs.
 const POLISH: usize = 2;
 const STILL_MATCHED: f64 = 0.98;
-/// Pairs of places that tell of a distortion are so many matching radii apart at most.
+/// Largest distance of place pairs that show a distortion, in matching radii.
 const DISTORTED: f64 = 50.0;
-/// A polynomial is fitted to at least so many pairs.
+/// Least number of pairs for the fit of a polynomial.
 const LEAST_FOR_CUBIC: usize = 40;
 
 /// A place in the suspect and the same place in the reference.
 type PlacePair = [[f64; 2]; 2];
 
-/// Where to start a search.
+/// The start of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// As it stands, by landmarks or by geometry, whichever is best.
+    /// The identity, landmarks or geometry, whichever is best.
     Auto,
-    /// Features with the same attribute values.
+    /// Features with equal attribute values.
     Landmarks,
-    /// Features of the same shape.
+    /// Features of equal shape.
     Geometry,
-    /// Nowhere: the suspect is taken as it stands.
+    /// No search: the suspect stays in its place.
     None,
 }
 
 impl Registrar<'_> {
-    /// The map from the suspect to the reference, which are in the same CRS.
+    /// Registers a suspect that is in the CRS of the reference.
     pub fn register(&self, suspect: &MapData, start: Start) -> Registration {
         let search = Search { registrar: self, suspect };
         let found = match start {
@@ -56,43 +56,43 @@ impl Registrar<'_> {
         if found.matched == 0 { self.as_it_stands(suspect) } else { found }
     }
 
-    /// No map at all.
+    /// Returns the registration by the identity, without a search.
     pub fn as_it_stands(&self, suspect: &MapData) -> Registration {
         let search = Search { registrar: self, suspect };
         search.registration("identity", 0, &search.matched(Affine::IDENTITY.into(), self.radius_m))
     }
 
-    /// The map from a suspect that is about in place.
+    /// Registers a suspect that is approximately in place.
     pub fn refine_in_place(&self, suspect: &MapData) -> Registration {
         Search { registrar: self, suspect }.refine("identity", Affine::IDENTITY, 0)
     }
 }
 
-/// Where to start from, the cheapest first.
+/// A kind of start, the cheapest first.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
-    /// The suspect is about in place.
+    /// The suspect is approximately in place.
     AsItStands,
-    /// Attribute values.
+    /// Equal attribute values.
     Landmarks,
     /// Whole rings and lines.
     Polylines,
     /// Six vertices along a line or ring.
     Lines,
-    /// A vertex and its five nearest.
+    /// A vertex and its five nearest neighbours.
     Points,
 }
 
-/// One suspect and the reference it is brought onto.
+/// One suspect and the reference onto which it is registered.
 struct Search<'a> {
-    /// Of the reference.
+    /// The reference side.
     registrar: &'a Registrar<'a>,
-    /// In the CRS of the reference.
+    /// The suspect, in the CRS of the reference.
     suspect: &'a MapData,
 }
 
 impl Search<'_> {
-    /// The best of several ways.
+    /// Returns the best registration of several ways.
     fn best(&self, ways: &[Way]) -> Registration {
         let mut pairs: Vec<PlacePair> = Vec::new();
         let mut best = self.nothing("identity");
@@ -112,7 +112,7 @@ impl Search<'_> {
         self.bend(&best, &pairs).unwrap_or(best)
     }
 
-    /// Whether about as many vertices match when the suspect is certainly not in place.
+    /// Returns whether about as many vertices match after the suspect is shifted out of place.
     fn is_chance(&self, found: &Registration) -> bool {
         let radius_m = self.registrar.radius_m;
         let [a, b, c, d, e, f] = found.affine;
@@ -126,7 +126,7 @@ impl Search<'_> {
         Registration { method, matched: 0, share: 0.0, ..as_it_stands }
     }
 
-    /// One way; pairs of places that it went by are added to `pairs`.
+    /// Registers by one way and appends its pairs of places to `pairs`.
     fn by_way(&self, way: Way, pairs: &mut Vec<PlacePair>) -> Registration {
         let reference = self.registrar.reference;
         let (method, found) = match way {
@@ -135,7 +135,8 @@ impl Search<'_> {
             Way::Landmarks => ("landmarks", landmarks::pairs(&reference.labels, &self.suspect.labels)),
             Way::Polylines => ("geometry", polylines::pairs(&reference.polylines, &self.suspect.polylines)),
         };
-        // The places of cut or edited features are off by any amount: within a few metres, or within more.
+        // The places of cut or edited features are off by an unknown amount, so the consensus tries
+        // several radii.
         let radii = [1.0, 5.0, 25.0].map(|factor| factor * self.registrar.radius_m);
         let starts = radii.iter().filter_map(|radius| consensus(&found, self.registrar.unit(), *radius));
         let best = self.best_start(method, starts);
@@ -158,8 +159,8 @@ impl Search<'_> {
         let star = |vertices: &VertexTable, metric: Affine| {
             windows::of_points(vertices.coords(), |p| metric.apply(p))
         };
-        // Neighbours are those of a map at unit covariance, which no affine map changes; of a part, whose
-        // covariance is another one, those of the map as it stands.
+        // Neighbours are found at unit covariance, which is invariant under affine maps. A part of
+        // a map has another covariance, so a second attempt uses its coordinates unchanged.
         let white = |vertices: &VertexTable| star(vertices, Affine::whitening(vertices.coords()));
         let [x_scale, y_scale] = self.registrar.unit();
         let metres = Affine { coefficients: [x_scale, 0.0, 0.0, 0.0, y_scale, 0.0] };
@@ -172,7 +173,7 @@ impl Search<'_> {
         if as_they_are.matched > whitened.matched { as_they_are } else { whitened }
     }
 
-    /// The best of several affine maps, each refined. Without any, the identity, and nothing matches.
+    /// Refines several affine maps and returns the best; without any, the identity without matches.
     fn best_start(
         &self,
         method: &'static str,
@@ -191,7 +192,7 @@ impl Search<'_> {
         best
     }
 
-    /// Improves an affine map on the vertices that match under it.
+    /// Refines an affine map on the vertices that match under it.
     fn refine(&self, method: &'static str, start: Affine, landmarks: usize) -> Registration {
         let radius_m = self.registrar.radius_m;
         let mut best = self.matched(start.into(), radius_m);
@@ -209,8 +210,8 @@ impl Search<'_> {
         self.registration(method, landmarks, &self.polish(best))
     }
 
-    /// Least squares instead of least distances: once the pairs are right they are the more exact, for all that
-    /// is left is the mark and noise.
+    /// Replaces least distances by least squares, which are more exact once the pairs are right:
+    /// only the mark and noise remain then.
     fn polish(&self, best: Pairs) -> Pairs {
         let least = STILL_MATCHED * best.from.len() as f64;
         let mut polished = best;
@@ -218,7 +219,7 @@ impl Search<'_> {
             let fit = Affine::fit(&polished.from, &polished.to, &vec![1.0; polished.from.len()]);
             let Some(affine) = fit else { break };
             let next = self.matched(affine.into(), self.registrar.radius_m);
-            // Where nothing moved, rounding must not move it.
+            // Where no vertex moved, rounding must not introduce a displacement.
             let closer = next.from.len() != polished.from.len() || next.rms_m < polished.rms_m;
             if (next.from.len() as f64) < least || !closer {
                 break;
@@ -228,7 +229,7 @@ impl Search<'_> {
         polished
     }
 
-    /// Adds a cubic polynomial, where that matches clearly more vertices than the affine map alone.
+    /// Adds a cubic polynomial where it matches clearly more vertices than the affine map alone.
     fn bend(&self, flat: &Registration, pairs: &[PlacePair]) -> Option<Registration> {
         if flat.share >= ALMOST_ALL {
             return None;
@@ -238,7 +239,8 @@ impl Search<'_> {
         let half = (max[0] - min[0]).max(max[1] - min[1]) / 2.0;
         let frame = Cubic::zero(vertices.centre(), half);
         let refined = Affine { coefficients: flat.affine };
-        // From the vertices that match outwards, or from features all over the map.
+        // The fit starts from the matched vertices and works outwards, or from features all over
+        // the map.
         let near = self.matched(refined.into(), 4.0 * registrar.radius_m);
         let mut starts = vec![(refined, near.from, near.to)];
         if let Some((affine, _)) = consensus(pairs, registrar.unit(), DISTORTED * registrar.radius_m) {
@@ -260,7 +262,7 @@ impl Search<'_> {
         kept.then(|| self.registration(flat.method, flat.landmarks, &bent))
     }
 
-    /// Follows a distortion from pairs of places to all vertices it can reach.
+    /// Follows a distortion from pairs of places to all vertices within reach.
     fn bend_from(&self, affine: Affine, frame: Cubic, from: &[[f64; 2]], to: &[[f64; 2]]) -> Option<Pairs> {
         let fit = |from: &[[f64; 2]], to: &[[f64; 2]]| {
             let flat: Vec<[f64; 2]> = from.iter().map(|p| affine.apply(*p)).collect();
@@ -278,7 +280,7 @@ impl Search<'_> {
         Some(best)
     }
 
-    /// Matched pairs of the sample under a map.
+    /// Returns the matched pairs of the sample under a transformation.
     fn matched(&self, transform: Transform, radius_m: f64) -> Pairs {
         let (ours, theirs) = (self.registrar.reference.vertices.coords(), self.suspect.vertices.coords());
         let moved: Vec<[f64; 2]> = theirs.iter().map(|p| transform.apply(*p)).collect();
@@ -295,10 +297,10 @@ impl Search<'_> {
         pairs
     }
 
-    /// The report on a map and the vertices that match under it.
+    /// Returns the registration for a transformation and the vertices that match under it.
     fn registration(&self, method: &'static str, landmarks: usize, pairs: &Pairs) -> Registration {
         let matched = pairs.from.len();
-        // Of a sampled reference only so many vertices of the suspect can be matched.
+        // A sample of the reference limits the number of possible matches.
         let smaller = self.registrar.reference.vertices.len().min(self.suspect.vertices.len());
         let most = smaller.div_ceil(self.registrar.step()).max(1);
         Registration {
@@ -314,10 +316,10 @@ impl Search<'_> {
     }
 }
 
-/// Matched vertices under a map.
+/// Matched vertices under a transformation.
 struct Pairs {
     transform: Transform,
-    /// Suspect coordinates as they stand.
+    /// Original coordinates of the suspect.
     from: Vec<[f64; 2]>,
     /// Reference coordinates.
     to: Vec<[f64; 2]>,
@@ -325,7 +327,7 @@ struct Pairs {
 }
 
 impl Pairs {
-    /// The one with more pairs, or as many and closer ones.
+    /// Returns the set with more pairs, or the closer one of equal size.
     fn or_better(self, next: Pairs) -> Pairs {
         let rank = |pairs: &Pairs| (pairs.from.len(), -pairs.rms_m);
         if rank(&next) >= rank(&self) { next } else { self }

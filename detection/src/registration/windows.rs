@@ -1,36 +1,36 @@
-//! Recognising six neighbouring vertices by their arrangement, for what is left of cut or thinned lines and
-//! rings, and for maps that have nothing but points.
+//! Recognition of six neighbouring vertices by their arrangement, for the remains of cut or thinned
+//! lines and rings, and for maps of points alone.
 //!
-//! Brought to unit covariance, the vertices of a window differ between maps by a rotation or reflection
-//! alone, whatever affine map lies between. Products of neighbouring ones as complex numbers take out the
-//! rotation; they are the key by which windows are looked up. A pair of windows then gives a whole affine map,
-//! and the map that most other pairs agree on wins.
+//! At unit covariance the vertices of a window differ between maps only by a rotation or
+//! reflection, whatever affine map separates them. Products of neighbouring vertices as complex
+//! numbers remove the rotation; they are the key for the lookup of windows. A pair of windows then
+//! determines an affine map, and the map that most other pairs agree on wins.
 
 use super::affine::Affine;
 use meshmark_core::{ground::Ground, map_data::Polyline};
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-/// Vertices of a window.
+/// Number of vertices of a window.
 const SIZE: usize = 6;
-/// Real and imaginary parts of the products.
+/// Length of a key: real and imaginary parts of the products.
 const KEY: usize = 2 * (SIZE - 1);
-/// Windows of the reference that are compared, the largest: they stand out from noise.
+/// Number of windows of the reference that are compared: the largest, which exceed the noise most.
 const MOST_REFERENCE: usize = 60_000;
-/// Windows of the suspect that are looked up.
+/// Number of windows of the suspect that are looked up.
 const MOST_SUSPECT: usize = 1_000;
-/// A pair counts when the next best is this many times further away.
+/// A pair counts when the second-best one is this many times further away.
 const DISTINCT: f64 = 1.3;
-/// Pairs that are looked at for a consensus, the most distinct.
+/// Number of pairs examined for a consensus: the most distinct.
 const MOST_PAIRS: usize = 800;
-/// Pairs whose affine maps are tried in full.
+/// Number of pairs whose affine maps are fitted completely.
 const MOST_REFITTED: usize = 8;
-/// Fewer pairs than this agree by chance.
+/// Fewer pairs than this may agree by chance.
 const LEAST_AGREEING: usize = 5;
 /// Vertices where a line turns by less than this angle, radians, are left out.
 const STRAIGHT: f64 = 0.01;
 
-/// The order of a window's vertices as they are kept.
+/// The stored order of the vertices of a window.
 const PLAIN: [usize; SIZE] = [0, 1, 2, 3, 4, 5];
 
 /// Six neighbouring vertices.
@@ -39,20 +39,20 @@ pub struct Window {
     vertices: [[f64; 2]; SIZE],
     /// The vertices at unit covariance, as complex numbers.
     white: [[f64; 2]; SIZE],
-    /// Determinant of the covariance: affine maps keep its order among windows.
+    /// Determinant of the covariance; affine maps preserve its order among windows.
     size: f64,
 }
 
-/// How the vertices of a window lie.
+/// The arrangement of the vertices of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrangement {
     /// Along a line, from either end.
     Line,
-    /// One in the middle, the others around it.
+    /// One vertex in the middle, the others around it.
     Star,
 }
 
-/// Windows of the lines and rings of a map.
+/// Returns the windows of the lines and rings of a map.
 pub fn of_polylines(polylines: &[Polyline]) -> Vec<Window> {
     let of_polyline = |polyline: &Polyline| {
         let vertices = turning(polyline);
@@ -68,7 +68,7 @@ pub fn of_polylines(polylines: &[Polyline]) -> Vec<Window> {
         (0..starts).filter_map(window).collect::<Vec<_>>()
     };
     let mut windows: Vec<Window> = polylines.par_iter().flat_map_iter(of_polyline).collect();
-    // Neighbouring polygons share walls, and with them windows.
+    // Neighbouring polygons share walls and therefore windows.
     let place = |w: &Window| {
         let mut vertices = w.vertices;
         vertices.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
@@ -79,7 +79,8 @@ pub fn of_polylines(polylines: &[Polyline]) -> Vec<Window> {
     windows
 }
 
-/// The vertices at which a polyline turns: others may be added or dropped on straight edges.
+/// Returns the vertices at which a polyline turns, as edits may add or drop others on straight
+/// edges.
 fn turning(polyline: &Polyline) -> Vec<[f64; 2]> {
     let mut kept: Vec<[f64; 2]> = Vec::with_capacity(polyline.vertices.len());
     let turns = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
@@ -105,8 +106,8 @@ fn turning(polyline: &Polyline) -> Vec<[f64; 2]> {
     kept
 }
 
-/// Windows of points: each with its five nearest, anticlockwise, nearest by `metric` (coordinates in which
-/// distances are taken).
+/// Returns the windows of points: each with its five nearest neighbours, anticlockwise. `metric`
+/// maps points to the coordinates in which distances are measured.
 pub fn of_points(points: &[[f64; 2]], metric: impl Fn([f64; 2]) -> [f64; 2] + Sync) -> Vec<Window> {
     let node = |(index, p): (usize, &[f64; 2])| Place { at: metric(*p), index: index as u32 };
     let tree = RTree::bulk_load(points.iter().enumerate().map(node).collect());
@@ -143,7 +144,7 @@ impl PointDistance for Place {
 }
 
 impl Window {
-    /// `None` when the vertices are on a line.
+    /// Creates a window; returns `None` when the vertices lie on a line.
     fn new(vertices: [[f64; 2]; SIZE], arrangement: Arrangement) -> Option<Self> {
         let centre = centre(&vertices);
         let centred = vertices.map(|v| [v[0] - centre[0], v[1] - centre[1]]);
@@ -153,7 +154,8 @@ impl Window {
         if size.is_nan() || size <= 1e-8 * (xx + yy).powi(2) {
             return None;
         }
-        // Cholesky: any root of the covariance will do, they differ by a rotation.
+        // Any root of the covariance serves, as roots differ by a rotation; this is the Cholesky
+        // factor.
         let a = xx.sqrt();
         let b = xy / a;
         let c = (yy - b * b).sqrt();
@@ -162,7 +164,7 @@ impl Window {
         Some(Window { vertices: order.map(|i| vertices[i]), white: order.map(|i| white[i]), size })
     }
 
-    /// The key of the vertices in another order, perhaps mirrored.
+    /// Returns the key of the vertices in another order, optionally mirrored.
     fn key(&self, order: &[usize; SIZE], mirrored: bool) -> [f64; KEY] {
         let sign = if mirrored { -1.0 } else { 1.0 };
         let mut key = [0.0; KEY];
@@ -180,7 +182,8 @@ fn centre(vertices: &[[f64; 2]]) -> [f64; 2] {
 }
 
 impl Arrangement {
-    /// The order all maps agree on: from the end, or the neighbour, that is further out at unit covariance.
+    /// Returns an order that all maps agree on: it starts from the end, or the neighbour, that is
+    /// further out at unit covariance.
     fn canonical(self, white: &[[f64; 2]; SIZE]) -> [usize; SIZE] {
         let out = |i: usize| white[i][0].powi(2) + white[i][1].powi(2);
         match self {
@@ -193,7 +196,7 @@ impl Arrangement {
         }
     }
 
-    /// The order in which a mirrored map shows the same vertices.
+    /// Returns the order of the same vertices in a mirrored map.
     fn mirrored(self) -> [usize; SIZE] {
         match self {
             Arrangement::Line => PLAIN,
@@ -220,17 +223,17 @@ impl PointDistance for Node {
     }
 }
 
-/// A window of the suspect and the one of the reference that is most like it.
+/// A window of the suspect and the most similar one of the reference.
 struct Pair {
     from: [[f64; 2]; SIZE],
     to: [[f64; 2]; SIZE],
     affine: Affine,
-    /// Square of how many times further away the next best is.
+    /// Square of the ratio of the second-best distance to the best.
     distinct: f64,
 }
 
-/// Affine maps from the suspect to the reference on which several pairs of windows agree, and how many do.
-/// `within_m`: how far apart agreeing places may be.
+/// Returns affine maps from the suspect to the reference on which several pairs of windows agree,
+/// and the number of those pairs. `within_m` is the largest distance of agreeing places, metres.
 pub fn candidates(
     reference: Vec<Window>,
     suspect: Vec<Window>,
@@ -250,7 +253,7 @@ pub fn candidates(
         };
         pairs.iter().filter(agrees).collect()
     };
-    // A window is small: its map is off by a share of the distance from it.
+    // A window is small, so the error of its map grows with the distance from it.
     let mut votes: Vec<(usize, usize)> = (0..pairs.len())
         .into_par_iter()
         .map(|i| (agreeing(&pairs[i].affine, centre(&pairs[i].to), 0.1).len(), i))
@@ -283,7 +286,8 @@ fn largest(mut windows: Vec<Window>, most: usize) -> Vec<Window> {
     windows
 }
 
-/// Half of the looked-up windows are the largest, the others are spread over smaller ones.
+/// Selects windows to look up: half of them are the largest, the others are spread over smaller
+/// ones.
 fn spread(windows: Vec<Window>) -> Vec<Window> {
     let windows = largest(windows, MOST_REFERENCE / 4);
     let half = MOST_SUSPECT / 2;
@@ -292,7 +296,7 @@ fn spread(windows: Vec<Window>) -> Vec<Window> {
     windows.into_iter().enumerate().filter(|(i, _)| chosen(*i)).map(|(_, window)| window).collect()
 }
 
-/// Pairs of windows that are distinctly alike, the most distinct first.
+/// Returns the distinct pairs of similar windows, the most distinct first.
 fn pairs(reference: &[Window], suspect: &[Window], arrangement: Arrangement) -> Vec<Pair> {
     let node = |(index, w): (usize, &Window)| Node { key: w.key(&PLAIN, false), index: index as u32 };
     let tree = RTree::bulk_load(reference.iter().enumerate().map(node).collect());
@@ -305,7 +309,7 @@ fn pairs(reference: &[Window], suspect: &[Window], arrangement: Arrangement) -> 
         }
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let &(distance, index, order) = nearest.first()?;
-        // A symmetric window is like itself in several orders, and says nothing.
+        // A symmetric window is similar to itself in several orders and carries no information.
         let distinct = nearest.get(1).map_or(f64::INFINITY, |next| next.0 / distance);
         let from = orders[order].0.map(|i| window.vertices[i]);
         let to = reference[index as usize].vertices;

@@ -1,4 +1,4 @@
-//! Subcommands and their flags; those of the marking options are made from the one table.
+//! Subcommands and their flags. The table of marking options generates the flags of those options.
 
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum};
 use meshmark_core::options::{OPTIONS, Spelling};
@@ -177,15 +177,15 @@ pub(super) struct VerifyArgs {
     pub(super) marking: MarkingFlags,
 }
 
-/// The marking options as flags of `verify`, from the one table.
+/// The marking options as flags of `verify`, generated from the table.
 pub(super) struct MarkingFlags(pub(super) Vec<(&'static str, String)>);
 
-/// Those of `distribute`, whose subjects are in its list.
+/// The marking options as flags of `distribute`; its list holds the subjects.
 pub(super) struct DistributeFlags(pub(super) Vec<(&'static str, String)>);
 
 const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
 
-/// A flag for every option that shapes the mark.
+/// Returns a flag for every option that shapes the mark.
 fn flags(heading: &'static str) -> impl Iterator<Item = Arg> {
     OPTIONS.iter().filter(|option| option.shapes_mark).map(move |option| {
         let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
@@ -198,7 +198,7 @@ fn flags(heading: &'static str) -> impl Iterator<Item = Arg> {
     })
 }
 
-/// What was given of them.
+/// Returns the given flags and their values.
 fn given(matches: &ArgMatches) -> Vec<(&'static str, String)> {
     let value = |name: &'static str| Some((name, matches.try_get_one::<String>(name).ok()??.clone()));
     OPTIONS.iter().filter_map(|option| value(option.name)).collect()
@@ -255,7 +255,7 @@ fn positive(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
-/// Above this a match would be nothing to tell a court of.
+/// A match at a larger significance is no evidence.
 const LARGEST_SIGNIFICANCE: f64 = 1e-3;
 
 fn probability(text: &str) -> std::result::Result<f64, String> {

@@ -1,4 +1,4 @@
-//! The command line: flags in, exit code out.
+//! The command line: it turns flags into an exit code.
 
 mod arguments;
 mod request;
@@ -23,10 +23,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The exit code of a command that did what it was asked for, and that of a match.
+/// The exit code of a command that succeeds; a match has the same code.
 const DONE: u8 = 0;
 
-/// Runs the command of this process; its exit code.
+/// Runs the command of this process and returns its exit code.
 pub fn run() -> u8 {
     gdal_failures::quieten_gdal();
     let result = match Cli::parse().command {
@@ -42,12 +42,12 @@ pub fn run() -> u8 {
     })
 }
 
-/// On one line: names that files are made of shall not steer the terminal.
+/// Prints a warning on one line. Names in files must not control the terminal.
 fn warn(text: &str) {
     eprintln!("meshmark: {}", printable(text));
 }
 
-/// Prints an answer. Nobody has to read it to its end.
+/// Prints an answer. A reader may close the pipe before the end.
 fn print(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
@@ -74,7 +74,7 @@ fn keygen(path: &PathBuf) -> Result<()> {
     let mut file = options.open(path).map_err(failed)?;
     let written = file.write_all(key.to_json().as_bytes()).and_then(|()| file.sync_all());
     if let Err(error) = written {
-        let _ = std::fs::remove_file(path); // half a key is worse than none
+        let _ = std::fs::remove_file(path); // an incomplete key is worse than none
         return Err(failed(error));
     }
     print(&format!("key {} written to {}\n", key.id(), path.display()))?;
@@ -98,7 +98,7 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
         .transpose()?;
     let mut comparison =
         compare(&args.reference, &args.marked, layers.as_deref(), args.precision, file.is_some())?;
-    let detail = comparison.detail.take(); // a report file has it
+    let detail = comparison.detail.take(); // only a report file holds it
     print(&if args.json { comparison.to_json() } else { comparison.to_text() })?;
     if let Some((file, mut detail)) = file.zip(detail) {
         detail.provenance = provenance;
@@ -146,7 +146,7 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
         map.write(&target)?;
     }
-    let evidence = report.evidence.take(); // a report file has it
+    let evidence = report.evidence.take(); // only a report file holds it
     print(&if json { report.to_json() } else { report.to_text() })?;
     let Some(inputs) = inputs else { return Ok(report.exit_code()) };
     let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
@@ -171,7 +171,7 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     Ok(report.exit_code())
 }
 
-/// That of this process.
+/// Returns the command line of this process.
 fn command_line() -> String {
     report::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }

@@ -1,4 +1,4 @@
-//! What `verify` is to do: flags, key and record put together.
+//! The request of `verify`, made from flags, key and record.
 
 use super::arguments::VerifyArgs;
 use meshmark_core::{
@@ -8,7 +8,7 @@ use meshmark_core::{
 };
 use meshmark_verifier::{Error, Request, Result, inputs::texts, verify::check_key};
 
-/// Puts key, record and flags together.
+/// Combines key, record and flags.
 pub(super) fn request(args: VerifyArgs) -> Result<Request> {
     let key = texts::key(&args.key)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
@@ -42,7 +42,7 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
     })
 }
 
-/// The options a record was made with.
+/// Returns the options of a record.
 fn from_record(record: &Record) -> Result<Options> {
     Ok(Options {
         key_path: None,
@@ -54,7 +54,7 @@ fn from_record(record: &Record) -> Result<Options> {
     })
 }
 
-/// A flag may repeat what the record says, not contradict it.
+/// Checks that flags agree with the record, which they may repeat.
 fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> {
     let recorded = from_record(record)?;
     for (name, value) in flags {

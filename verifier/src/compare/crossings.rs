@@ -1,4 +1,4 @@
-//! Crossings.
+//! Crossings of segments before and after marking.
 
 use meshmark_core::{orientation::orientation, scale::Measure};
 use rayon::prelude::*;
@@ -9,25 +9,26 @@ use rstar::{
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Crossings up to this are rounding, metres.
+/// Crossings up to this depth are rounding, metres.
 const GRAZE_M: f64 = 1e-6;
 
 type Segment = GeomWithData<Rectangle<[f64; 2]>, u32>;
 
-/// Pairs of segments of any features that cross by more than 1e-6 m.
+/// Counts of pairs of segments, of any features, that cross by more than 1e-6 m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Crossings {
-    /// In the reference.
+    /// Pairs in the reference.
     pub before: usize,
-    /// In the marked map.
+    /// Pairs in the marked map.
     pub after: usize,
-    /// Pairs that did not cross before, by no distance.
+    /// Pairs that cross only in the marked map.
     pub new: usize,
-    /// Pairs that cross no longer, by no distance.
+    /// Pairs that cross only in the reference.
     pub lost: usize,
 }
 
-/// Counts pairs of segments that cross before and after, and says where one of the two did not or does no longer.
+/// Counts pairs of segments that cross before and after. Also returns the places, CRS units, where
+/// only one of the two crosses.
 pub(super) fn crossings(
     segments: &[[u32; 2]],
     before: &[[f64; 2]],
@@ -68,12 +69,13 @@ fn crossing_pairs(segments: &[[u32; 2]], coords: &[[f64; 2]]) -> BTreeSet<[u32; 
     leaves.par_iter().flat_map_iter(of_segment).collect()
 }
 
-/// Whether the ends of either are on different sides of the other.
+/// Returns whether the ends of each segment are on different sides of the other.
 fn cross([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
     orientation(a, b, c) * orientation(a, b, d) < 0.0 && orientation(c, d, a) * orientation(c, d, b) < 0.0
 }
 
-/// How far the nearest of the four ends of two crossing segments is from the other segment's line.
+/// Returns the distance of the nearest of the four ends of two crossing segments from the line of
+/// the other segment, metres.
 fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], measure: &Measure) -> f64 {
     let height = |a: [f64; 2], b: [f64; 2], p: [f64; 2]| {
         let ([ex, ey], [px, py]) = (measure.metres_between(a, b), measure.metres_between(a, p));

@@ -1,4 +1,4 @@
-//! Where on the map a comparison found what: what its report draws, thinned to what a page can show.
+//! The places of differences, thinned to the resolution of a page, for the report of a comparison.
 
 use crate::{
     Result,
@@ -10,51 +10,52 @@ use meshmark_detection::Histogram;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
-/// Angles that turned less than this did not change to speak of, degrees.
+/// Angles that turn by less than this do not count as changed, degrees.
 pub const NOTABLE_DEG: f64 = 1.0;
-/// Cells of the map of angles along its longer side.
+/// Number of cells along the longer side of the map of angles.
 const CELLS: usize = 60;
-/// Places of topology that are drawn; more would only cover each other.
+/// Number of places per kind of topology change that are drawn; more overlap each other.
 const MOST_PLACES: usize = 2000;
 
-/// Where on the map what differs.
+/// The places of differences on the map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Detail {
-    /// The files; null until they are given.
+    /// The files; null until they are digested.
     pub provenance: Option<ComparedFiles>,
-    /// Where the reference is.
+    /// The extent of the reference.
     pub extent: Extent,
-    /// How far vertices are from where they were, metres; null without vertices.
+    /// Displacements of the vertices, metres; null without vertices.
     pub displacement_m: Option<Histogram>,
-    /// How far the angles at corners turned, degrees; null without corners.
+    /// Changes of the angles at corners, degrees; null without corners.
     pub angle_change_deg: Option<Histogram>,
-    /// Some of the vertices: x and y, CRS units, displacement in x and y, metres.
+    /// A sample of the vertices: x and y, CRS units, displacement in x and y, metres.
     pub moved: Vec<[f64; 4]>,
-    /// Cells in which an angle turned by 1° or more: x and y of their middle, CRS units, and the largest change, degrees.
+    /// Cells in which an angle turned by 1° or more: x and y of their middle, CRS units, and the
+    /// largest change, degrees.
     pub angle_cells: Vec<[f64; 3]>,
     /// Width and height of a cell, CRS units.
     pub cell: [f64; 2],
-    /// Where the topology changed.
+    /// Places of changed topology.
     pub topology: Topology,
     /// Rings and lines of the reference, thinned, CRS units.
     #[serde(skip)]
     pub lines: Vec<Vec<[f64; 2]>>,
 }
 
-/// Places, CRS units, at most 2000 of each.
+/// Places of changed topology, CRS units, at most 2000 of each kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Topology {
-    /// Vertices that were torn apart.
+    /// Vertices whose occurrences separated.
     pub torn: Vec<[f64; 2]>,
     /// Geometries that became invalid.
     pub invalid: Vec<[f64; 2]>,
-    /// Polygons that overlap now.
+    /// Polygons that newly overlap.
     pub overlaps: Vec<[f64; 2]>,
-    /// Segments that cross now, or no longer.
+    /// Segments that cross in only one of the maps.
     pub crossings: Vec<[f64; 2]>,
 }
 
-/// The files of a comparison, and how to compare them again.
+/// The files of a comparison, and the means to repeat it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedFiles {
     /// The reference.
@@ -63,7 +64,7 @@ pub struct ComparedFiles {
     pub marked: Digested,
     /// The command line.
     pub command: String,
-    /// Programs and libraries that the result rests on, with their versions.
+    /// Programs and libraries that the result depends on, with their versions.
     pub versions: Vec<String>,
 }
 
@@ -71,21 +72,22 @@ impl ComparedFiles {
     /// Digests the files.
     ///
     /// # Errors
-    /// One of them cannot be read to its end.
+    /// Fails when one of them cannot be read to its end.
     pub fn read(reference: &Path, marked: &Path, command: String) -> Result<Self> {
         let versions = crate::report::versions();
         Ok(ComparedFiles { reference: digest(reference)?, marked: digest(marked)?, command, versions })
     }
 }
 
-/// What was compared, vertex by vertex.
+/// The comparison, vertex by vertex.
 pub(super) struct Findings<'a> {
     pub vertices: &'a VertexTable,
     pub moved: &'a [[f64; 2]],
     pub measure: &'a Measure<'a>,
     pub segments: &'a [[u32; 2]],
     pub corners: &'a [Corner],
-    /// Of torn vertices, new invalid geometries, new overlaps, changed crossings.
+    /// Places of torn vertices, new invalid geometries, new overlaps and changed crossings, CRS
+    /// units.
     pub places: [Vec<[f64; 2]>; 4],
 }
 
@@ -117,7 +119,7 @@ impl Findings<'_> {
     }
 }
 
-/// The largest change of every cell that has a notable one.
+/// Returns the middle and the largest change of every cell with a notable change.
 fn cells(grid: &Thinning, corners: &[Corner]) -> Vec<[f64; 3]> {
     let mut largest: BTreeMap<[u32; 2], f64> = BTreeMap::new();
     for corner in corners.iter().filter(|corner| corner.change_deg() >= NOTABLE_DEG) {

@@ -1,7 +1,7 @@
-//! What marking did to a map: `meshmark compare REFERENCE MARKED`.
+//! The effect of marking on a map: `meshmark compare REFERENCE MARKED`.
 //!
-//! Features correspond by their order within a layer, vertices by their order within a feature: the driver changes
-//! neither. Lengths, angles and areas are those on the ground.
+//! Features correspond by their order within a layer, vertices by their order within a feature: the
+//! driver changes neither. Lengths, angles and areas are measured on the ground.
 
 mod crossings;
 pub mod detail;
@@ -29,13 +29,13 @@ use std::{borrow::Cow, path::Path};
 pub struct Comparison {
     /// Version of this format.
     pub meshmark_comparison: u32,
-    /// How much was compared.
+    /// Numbers of compared objects.
     pub compared: Counts,
-    /// How far vertices are from where they were.
+    /// Displacements of the vertices.
     pub displacement: Displacement,
-    /// How far features are from where they were, as sets of points.
+    /// Hausdorff distances of the features.
     pub hausdorff: Hausdorff,
-    /// Angles at corners: vertices where two segments meet and no more.
+    /// Angles at corners: vertices where exactly two segments meet.
     pub angles: AngleChange,
     /// Areas of polygons.
     pub areas: Areas,
@@ -45,29 +45,29 @@ pub struct Comparison {
     pub overlaps: Overlaps,
     /// Segments that cross.
     pub crossings: Crossings,
-    /// Where on the map all that is; null but in a report file.
+    /// The places of differences; null except in a report file.
     pub detail: Option<Detail>,
 }
 
-/// Counts.
+/// Numbers of compared objects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Counts {
-    /// Geometries.
+    /// Number of geometries.
     pub features: usize,
-    /// Distinct vertices of the reference.
+    /// Number of distinct vertices of the reference.
     pub vertices: usize,
-    /// Those whose occurrences are no longer at one place.
+    /// Number of those whose occurrences are no longer at one place.
     pub torn_vertices: usize,
 }
 
-/// Further away than marks move anything, numbers of different CRS are of different places.
+/// No mark moves a vertex further than this, metres: coordinates are in different CRS then.
 const MOST_AWAY_M: f64 = 100.0;
 
-/// Two maps, feature by feature.
+/// Two maps, paired feature by feature.
 pub(crate) struct Pairs<'a> {
     pub features: Vec<Pair>,
     pub measure: Measure<'a>,
-    /// The grid of the marked map, CRS units; 0 without.
+    /// Cell size of the grid of the marked map, CRS units; 0 without a grid.
     pub grid: f64,
 }
 
@@ -77,10 +77,11 @@ pub(crate) struct Pair {
     pub after: Outline,
 }
 
-/// Compares two files, and keeps where they differ when `detailed`. `precision` is the grid of the marked one, CRS units: overlaps up to a cell of it are slivers.
+/// Compares two files, and keeps the places of differences when `detailed`. `precision` is the cell
+/// size of the grid of the marked file, CRS units: overlaps up to a cell of it are slivers.
 ///
 /// # Errors
-/// Unreadable input, a reference without a CRS, or maps whose features do not correspond.
+/// Fails on unreadable input, a reference without a CRS, and maps whose features do not correspond.
 pub fn compare(
     reference: &Path,
     marked: &Path,
@@ -171,7 +172,7 @@ impl Pairs<'_> {
         }
     }
 
-    /// The distinct segments, as pairs of indices.
+    /// Returns the distinct segments as pairs of indices.
     fn segments(&self, indices: &[u32]) -> Vec<[u32; 2]> {
         let mut rest = indices;
         let mut segments = Vec::new();

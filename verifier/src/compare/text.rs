@@ -1,15 +1,15 @@
-//! A comparison for people, and as JSON.
+//! A comparison as text and as JSON.
 
 use super::Comparison;
 use meshmark_core::counted;
 
 impl Comparison {
-    /// One JSON object.
+    /// Returns one JSON object.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("a comparison is JSON") + "\n"
     }
 
-    /// A few lines.
+    /// Returns a few lines of text.
     pub fn to_text(&self) -> String {
         let Comparison {
             compared,

@@ -1,4 +1,4 @@
-//! The copies to make: what their files are called, and which are finished.
+//! The copies to make: the names of their files, and whether they are finished.
 
 use crate::{Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
@@ -15,7 +15,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Whether GDAL opens a copy, and its layers have as many features as those of the map.
+/// Returns whether GDAL opens a copy, and its layers have the feature counts of the map.
 fn has_features(file: &Path, map: &Survey) -> bool {
     let Ok(dataset) = Dataset::open(file) else { return false };
     map.features
@@ -23,39 +23,39 @@ fn has_features(file: &Path, map: &Survey) -> bool {
         .all(|(&layer, &count)| dataset.layer(layer).is_ok_and(|layer| layer.feature_count() == count))
 }
 
-/// The longest part of a file name that is made of the recipient, characters.
+/// The longest part of a file name that comes from the recipient, characters.
 const LONGEST_SLUG: usize = 40;
 
-/// A recipient's copy.
+/// The copy of a recipient.
 pub struct MarkedCopy {
-    /// Who gets it.
+    /// The recipient.
     pub recipient: String,
-    /// Its main file.
+    /// The main file.
     pub file: PathBuf,
-    /// Its record.
+    /// The record.
     pub record: PathBuf,
 }
 
 impl MarkedCopy {
-    /// The copy for a recipient, in a folder.
+    /// Names the files of the copy for a recipient in a folder.
     pub fn new(recipient: String, folder: &Path, format: &Format) -> Self {
         let stem = stem(&recipient);
         let path = |ending: &str| folder.join(format!("{stem}{ending}"));
         MarkedCopy { file: path(format.ending()), record: path(".json"), recipient }
     }
 
-    /// The bits that the code carries in it.
+    /// Returns the bits that the code carries in the copy.
     pub fn carried(&self, key: &SecretKey) -> Message {
         self.subject().carried(key)
     }
 
-    /// What the mark says.
+    /// Returns the subject of the mark.
     pub fn subject(&self) -> Subject {
         Subject::Recipient(self.recipient.clone())
     }
 
-    /// Whether file and record are there already, the record being that of this marking. Only then may anything be
-    /// where the copy goes.
+    /// Returns whether file and record exist and the record is that of this marking. Fails when any
+    /// other file is in the place of the copy.
     pub fn is_finished(
         &self,
         options: &Options,
@@ -81,7 +81,7 @@ impl MarkedCopy {
         }
     }
 
-    /// Compares all that is known before the marking.
+    /// Compares everything that is determined before the marking.
     fn is_record_of_this(&self, options: &Options, key: &SecretKey, reference: &Reference) -> bool {
         let text = fs::read_to_string(&self.record).ok();
         let Some(found) = text.and_then(|text| Record::from_json(&text).ok()) else { return false };
@@ -90,7 +90,7 @@ impl MarkedCopy {
         Record { software: found.software.clone(), ..expected } == found
     }
 
-    /// A file that would be taken for a part of the copy.
+    /// Returns a file whose name makes it a part of the copy, if there is one.
     fn in_the_way(&self) -> Option<PathBuf> {
         let stem = self.record.with_extension("");
         let start = format!("{}.", stem.file_name()?.to_str()?);
@@ -105,8 +105,8 @@ impl MarkedCopy {
     }
 }
 
-/// A file name without ending: what can be read of the recipient, and 32 bits of a hash that tell apart those
-/// that read alike.
+/// Returns a file name without extension: the legible part of the recipient, and 32 bits of a hash
+/// that distinguish recipients with the same legible part.
 fn stem(recipient: &str) -> String {
     let mut slug = String::new();
     for letter in recipient.chars().flat_map(char::to_lowercase) {

@@ -1,23 +1,25 @@
-//! FlatGeobuf as GDAL writes it: coordinates written over in place, with the boxes of the index and the header.
+//! FlatGeobuf as GDAL writes it: this module overwrites coordinates in place, with the bounding
+//! boxes of index and header.
 //!
-//! A file is a header, an index and the features, each of header and features a FlatBuffer with its size before it
-//! (flatgeobuf.org/src/fbs). The index is a packed R-tree: nodes of a box and a place, level by level, the root first.
+//! A file has a header, an index and features. The header and each feature are FlatBuffers with a
+//! size prefix (flatgeobuf.org/src/fbs). The index is a packed R-tree: nodes of a bounding box and
+//! an offset, level by level, the root first.
 
 use crate::{Error, Result, inputs::gdal_failures};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_dataset::{marking::Moves, workplace::file_error};
 use std::{fs, ops::Range, path::Path};
 
-/// What a file begins with, whatever its version.
+/// The first bytes of a file of any version.
 const MAGIC: &[u8] = b"fgb";
-/// Where the header's size is.
+/// Offset of the size of the header.
 const HEADER: usize = 8;
-/// A box, least x and y, largest x and y, and a place, 64 bits each.
+/// Size of a node: a bounding box (least x and y, largest x and y) and an offset, 64 bits each.
 const NODE: usize = 40;
-/// How many nodes a node has when the header does not say.
+/// Number of children of a node when the header gives none.
 const DEFAULT_NODE_SIZE: u16 = 16;
 
-/// Numbers of fields in tables of the schema.
+/// Numbers of fields in the tables of the schema.
 mod field {
     pub const HEADER_ENVELOPE: usize = 1;
     pub const HEADER_FEATURES: usize = 8;
@@ -32,7 +34,7 @@ type Bounds = [f64; 4];
 
 const NOTHING: Bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
 
-/// Writes a copy of `plain` in which the vertices are where they go.
+/// Writes a copy of `plain` with moved vertices.
 pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
     let mut bytes = fs::read(plain).map_err(|error| file_error("reading", plain, error))?;
     let parts = Parts::parse(&bytes).ok_or(Error::UnknownFlatGeobuf)?;
@@ -57,7 +59,8 @@ pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
     Ok(fs::write(file, &bytes).map_err(|error| file_error("writing", file, error))?)
 }
 
-/// The boxes of all features in the order of the file. GDAL knows how far an arc reaches.
+/// Returns the bounding boxes of all features in the order of the file. GDAL computes the extent of
+/// arcs.
 fn boxes(file: &Path) -> Result<Vec<Bounds>> {
     gdal_failures::forget_failure();
     let failed = |error: gdal::errors::GdalError| {
@@ -76,12 +79,12 @@ fn boxes(file: &Path) -> Result<Vec<Bounds>> {
     Ok(layer.features().map(of_feature).collect())
 }
 
-/// Where the parts of a file are.
+/// Offsets of the parts of a file.
 struct Parts {
-    /// The box of the whole in the header, if there is one.
+    /// The bounding box of the whole map in the header, if there is one.
     envelope: Option<usize>,
     index: usize,
-    /// How many nodes every level of the index has, the leaves first; none without an index.
+    /// Number of nodes of every level of the index, the leaves first; empty without an index.
     levels: Vec<usize>,
     node_size: usize,
     features: Range<usize>,
@@ -105,12 +108,13 @@ impl Parts {
         (features.start <= bytes.len()).then_some(Parts { envelope, index, levels, node_size, features })
     }
 
-    /// Makes header and index fit features of these boxes.
+    /// Adapts header and index to features with these bounding boxes.
     fn fit(&self, bytes: &mut [u8], boxes: &[Bounds]) -> Option<()> {
         if let Some(envelope) = self.envelope {
             put(bytes, envelope, &boxes.iter().copied().fold(NOTHING, around));
         }
-        // From the leaves, which are last and one a feature in the order of the file, to the root.
+        // The update goes from the leaves to the root. The leaves are last, one for each feature in
+        // file order.
         let mut first = self.levels.iter().sum::<usize>();
         let mut below = boxes.to_vec();
         for (number, &count) in self.levels.iter().enumerate() {
@@ -145,13 +149,13 @@ fn around(a: Bounds, b: Bounds) -> Bounds {
     [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
 }
 
-/// Where every coordinate pair of a geometry is.
+/// Collects the offsets of the coordinate pairs of a geometry.
 fn coordinates(bytes: &[u8], geometry: usize, depth: usize, places: &mut Vec<usize>) -> Option<()> {
     (depth < 64).then_some(())?;
     if let Some(xy) = indirect_field(bytes, geometry, field::GEOMETRY_XY) {
         let count = u32_at(bytes, xy)? as usize / 2;
         bytes.get(xy + 4..xy + 4 + 16 * count)?;
-        // An empty point has none.
+        // An empty point has no coordinates.
         let is_point = |at: &usize| f64_at(bytes, *at).is_some_and(|x| !x.is_nan());
         places.extend((0..count).map(|pair| xy + 4 + 16 * pair).filter(is_point));
     }
@@ -163,17 +167,17 @@ fn coordinates(bytes: &[u8], geometry: usize, depth: usize, places: &mut Vec<usi
     })
 }
 
-/// The table of a FlatBuffer with its size before it.
+/// Returns the offset of the table of a size-prefixed FlatBuffer.
 fn root(bytes: &[u8], at: usize) -> Option<usize> {
     indirect(bytes, at + 4)
 }
 
-/// What an offset leads to.
+/// Returns the target of an offset.
 fn indirect(bytes: &[u8], at: usize) -> Option<usize> {
     Some(at + u32_at(bytes, at)? as usize)
 }
 
-/// Where a field of a table is, when the table has it.
+/// Returns the offset of a field of a table, if the table has it.
 fn entry(bytes: &[u8], table: usize, field: usize) -> Option<usize> {
     let vtable = table.checked_add_signed(-(i32::from_le_bytes(array(bytes, table)?) as isize))?;
     let size = usize::from(u16::from_le_bytes(array(bytes, vtable)?));
@@ -182,7 +186,7 @@ fn entry(bytes: &[u8], table: usize, field: usize) -> Option<usize> {
     (offset > 0).then_some(table + usize::from(offset))
 }
 
-/// What a field that is an offset leads to.
+/// Returns the target of a field that holds an offset.
 fn indirect_field(bytes: &[u8], table: usize, field: usize) -> Option<usize> {
     indirect(bytes, entry(bytes, table, field)?)
 }

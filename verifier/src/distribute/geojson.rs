@@ -1,4 +1,5 @@
-//! GeoJSON as GDAL writes it, a feature a line: the lines of one file with the positions of another.
+//! GeoJSON as GDAL writes it, one feature a line: joins the lines of one file with the positions of
+//! another.
 
 use crate::{Error, Result};
 use meshmark_dataset::{
@@ -11,11 +12,11 @@ use std::{
     path::Path,
 };
 
-/// What the bounding box of a collection comes after, in a line of its own.
+/// The key of the bounding box of a collection, which is on a line of its own.
 const BOX_OF_ALL: &[u8] = b"\"bbox\":";
 
-/// Writes `file`: all of `plain`, but for x and y of its positions, which are those of the same features of `marked`, and
-/// for its bounding boxes.
+/// Writes `file`: `plain` with x and y of its positions taken from the same features of `marked`,
+/// and with adapted bounding boxes.
 pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
     let open =
         |path| File::open(path).map(BufReader::new).map_err(|error| file_error("reading", path, error));
@@ -28,7 +29,7 @@ pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
     }
 }
 
-/// Whether foreign members of a feature hold places.
+/// Returns whether foreign members of a feature hold geometries or bounding boxes.
 pub fn has_foreign_places(path: &Path) -> Result<bool> {
     let failed = |error| file_error("reading", path, error);
     let (mut file, mut line) = (File::open(path).map(BufReader::new).map_err(failed)?, Vec::new());
@@ -64,18 +65,19 @@ fn join(mut plain: impl BufRead, mut marked: impl BufRead, mut to: impl Write) -
     to.flush()
 }
 
-/// The next line; false at the end.
+/// Reads the next line; returns false at the end.
 fn next(from: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
     line.clear();
     Ok(from.read_until(b'\n', line)? > 0)
 }
 
-/// The members of a collection begin with a quote, and it ends with a bracket.
+/// Lines of other members of a collection begin with a quote, and its last line with a bracket.
 fn is_feature(line: &[u8]) -> bool {
     line.starts_with(b"{ ")
 }
 
-/// The line of a feature with the positions of another one; none when they do not belong together.
+/// Returns the line of a feature with the positions of another one; none when the two do not
+/// correspond.
 fn feature(line: &[u8], marked: &[u8]) -> Option<Vec<u8>> {
     let of_place = |place| match place {
         Place::Position(range) => Some(numbers(&marked[range]).collect()),
@@ -102,7 +104,7 @@ fn feature(line: &[u8], marked: &[u8]) -> Option<Vec<u8>> {
     rest.next().is_none().then_some(joined)
 }
 
-/// A bounding box in which least and largest x and y are those of the positions.
+/// Returns a bounding box with the least and the largest x and y of the positions.
 fn bounding_box<'a>(mut list: Vec<&'a [u8]>, positions: &[Vec<&'a [u8]>]) -> Option<Vec<&'a [u8]>> {
     let half = list.len() / 2;
     if half < 2 {

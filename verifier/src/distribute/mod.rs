@@ -1,4 +1,5 @@
-//! Many recipients: one map, read and solved once, and a marked copy with its record for each of them.
+//! Distribution: reads and solves one map once, and writes a marked copy with its record for each
+//! recipient.
 //!
 //! ```text
 //! map ──survey──> vertices ──core::embedding──> displacements of a batch of recipients
@@ -6,7 +7,7 @@
 //!  └──ogr2ogr──> plain copy, for formats other than GPKG ────┴> copy ─> read back ─> published with its record
 //! ```
 //!
-//! A copy that is there is complete; the same command again makes those that are not.
+//! An existing copy is complete; a repeated command makes the missing ones.
 
 mod copies;
 mod flatgeobuf;
@@ -45,16 +46,16 @@ use std::{
 };
 use writing::Job;
 
-/// What was done.
+/// The result of a distribution.
 pub struct Summary {
-    /// Copies that were written.
+    /// Number of copies that were written.
     pub written: usize,
-    /// Copies that were there.
+    /// Number of copies that existed before.
     pub finished_before: usize,
 }
 
-/// Writes a marked copy and its record for every recipient who has none yet. `warn` hears of what is legal and
-/// probably not meant.
+/// Writes a marked copy and its record for every recipient who has none yet. `warn` receives
+/// warnings about legal but probably unintended input.
 pub fn distribute(
     request: &DistributeRequest,
     progress: &mut Progress,
@@ -84,12 +85,12 @@ pub fn distribute(
     });
     progress.finish();
     if done.is_err() && made {
-        drop(fs::remove_dir(folder)); // unless something is in it
+        drop(fs::remove_dir(folder)); // fails harmlessly unless the folder is empty
     }
     done
 }
 
-/// Makes the folder of the copies; whether it was not there.
+/// Creates the folder of the copies; returns whether it was missing.
 fn make_folder(folder: &Path) -> Result<bool> {
     let is_there = folder.is_dir();
     fs::create_dir_all(folder)
@@ -97,7 +98,7 @@ fn make_folder(folder: &Path) -> Result<bool> {
         .map_err(|error| Error::NoFolder { path: folder.into(), source: error })
 }
 
-/// Marks and writes, batch by batch.
+/// Marks and writes the copies, batch by batch.
 fn run(
     request: &DistributeRequest,
     survey: &Survey,
@@ -157,8 +158,8 @@ fn run(
     Ok(())
 }
 
-/// Calls `step` on so many threads until it has nothing left to do: how often it succeeded. After an error no step
-/// begins.
+/// Calls `step` on this many threads until it returns `None`, and returns the number of successes.
+/// After an error no further step begins.
 fn in_parallel(
     threads: usize,
     step: impl Fn() -> Option<Result<()>> + Sync,

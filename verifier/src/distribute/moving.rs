@@ -1,5 +1,5 @@
-//! A copy of the staged GeoPackage, in which geometries move. Nothing gets longer or shorter, so their bytes are
-//! written over in place, and rows, attributes and indexes are none of the work.
+//! Copies of the staged GeoPackage with moved geometries. No geometry changes its length, so their
+//! bytes are overwritten in place, while rows and attributes stay untouched.
 
 use super::{
     spatial_index,
@@ -14,10 +14,10 @@ use meshmark_dataset::{
 use rusqlite::{Connection, OpenFlags, params};
 use std::{fs, path::Path};
 
-/// Nobody sees the file before it is synced and published.
+/// The file is private until it is synced and published, so it needs no journal.
 const BEGIN: &str = "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN";
 
-/// Writes a copy in which the vertices are where they go `to`, CRS units.
+/// Writes a copy whose vertices are at the places `to`, CRS units.
 pub fn write(staged: &Staged, path: &Path, to: &[[f64; 2]]) -> Result<()> {
     fs::copy(&staged.path, path).map_err(|error| file_error("writing", path, error))?;
     let moved = || -> Done<()> {
@@ -36,7 +36,8 @@ pub fn write(staged: &Staged, path: &Path, to: &[[f64; 2]]) -> Result<()> {
     moved().map_err(|error| Error::NotWritten { what: "a copy".into(), reason: error.to_string() })
 }
 
-/// The bounding boxes of the features that have one, ascending by their ids.
+/// Moves the geometries of a layer. Returns the bounding boxes of the features that have one,
+/// ascending by feature id.
 fn move_geometries(connection: &Connection, layer: &Layer, to: &[[f64; 2]]) -> Done<Vec<(i64, Bounds)>> {
     let Some(&first) = layer.fids.first() else { return Ok(Vec::new()) };
     let mut places = layer.places(to);

@@ -1,5 +1,5 @@
-//! Copies by GDAL's own program, which keeps what no function of the `gdal` crate can write: feature ids, field
-//! subtypes, defaults, domains, metadata.
+//! Copies by the program `ogr2ogr` of GDAL, which keeps what no function of the `gdal` crate can
+//! write: feature ids, field subtypes, defaults, domains, metadata.
 
 use crate::{Error, Result};
 use meshmark_dataset::marking;
@@ -9,7 +9,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// Copies a dataset to a new one of this format; what `ogr2ogr` warned of.
+/// Copies a dataset to a new one of this format; returns the warnings of `ogr2ogr`.
 pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Vec<String>> {
     let mut command = Command::new("ogr2ogr");
     command
@@ -19,7 +19,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
         .arg(named(to))
         .arg(named(from))
         .stdin(Stdio::null());
-    command.env("OGR2OGR_USE_ARROW_API", "NO"); // which rounds what a column FLOAT holds to 32 bits
+    command.env("OGR2OGR_USE_ARROW_API", "NO"); // the Arrow path rounds FLOAT columns to 32 bits
     let output = command.output().map_err(|error| Error::NoOgr2ogr { source: error })?;
     let text = String::from_utf8_lossy(&output.stderr);
     let said = |kind: &str| -> Vec<String> {
@@ -28,7 +28,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
     };
     let [warnings, errors] = ["Warning ", "ERROR "].map(said);
     if output.status.success() {
-        // An error with which it goes on is a warning here.
+        // An error after which `ogr2ogr` continues is a warning here.
         let texts = warnings.into_iter().chain(errors);
         return Ok(grouped(texts)
             .into_iter()
@@ -39,7 +39,8 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
     Err(Error::Ogr2ogr { path: from.into(), format: format.into(), reason })
 }
 
-/// The first of all texts that differ in numbers alone, such as those of features, and how many more there are.
+/// Groups texts that differ only in numbers, such as those of features, and returns the first of
+/// each group with the number of the others.
 fn grouped(texts: impl Iterator<Item = String>) -> Vec<String> {
     let (mut groups, mut known): (Vec<(String, usize)>, HashMap<String, usize>) = Default::default();
     for text in texts {
@@ -56,18 +57,18 @@ fn grouped(texts: impl Iterator<Item = String>) -> Vec<String> {
     groups.into_iter().map(said).collect()
 }
 
-/// What is in quotes is a name, and counts.
+/// Replaces numbers outside quotes; a quoted number is a name.
 fn without_numbers(text: &str) -> String {
     let is_number = |word: &str| word.trim_end_matches(['.', ',', ':', ';']).parse::<f64>().is_ok();
     text.split(' ').map(|word| if is_number(word) { "0" } else { word }).collect::<Vec<_>>().join(" ")
 }
 
-/// Without the folder of a file that nobody is to look for.
+/// Removes the folder of a private file from a text.
 fn nameless(text: String, file: &Path) -> String {
     file.parent().map_or(text.clone(), |folder| text.replace(&format!("{}/", folder.display()), ""))
 }
 
-/// A file name that begins with a dash is no option.
+/// Prefixes a file name that begins with a dash, so that it is not read as an option.
 fn named(path: &Path) -> PathBuf {
     match path.as_os_str().as_encoded_bytes().first() {
         Some(b'-') => Path::new(".").join(path),

@@ -1,5 +1,6 @@
-//! The unmarked map as plain `ogr2ogr` writes it in the format of the copies. A copy is that, but for the coordinates: so
-//! names, values and ids of fields never pass through a GeoPackage, which cannot hold all of them.
+//! The unmarked map as plain `ogr2ogr` writes it in the format of the copies. A copy differs from
+//! it only in coordinates, so names, values and ids of fields never pass through a GeoPackage,
+//! which cannot hold all of them.
 
 use super::{flatgeobuf, geojson, moving, ogr2ogr, staged::Staged};
 use crate::{Error, Result};
@@ -13,7 +14,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The files of a Shapefile that hold geometries; the others are those of the plain copy.
+/// The files of a Shapefile that hold geometries; all others come from the plain copy.
 const GEOMETRY_FILES: [&str; 2] = ["shp", "shx"];
 
 /// The plain copy.
@@ -23,7 +24,8 @@ pub struct Plain {
 }
 
 impl Plain {
-    /// Copies the map, of one layer, into an empty folder; `warn` hears what `ogr2ogr` warns of.
+    /// Copies the single layer of a map into an empty folder; `warn` receives the warnings of
+    /// `ogr2ogr`.
     pub fn new(
         (map, layer): (&Path, &str),
         folder: &Path,
@@ -38,8 +40,8 @@ impl Plain {
         Ok(Plain { path, driver: format.driver })
     }
 
-    /// Writes a copy with the vertices elsewhere; `work` is a folder for what is only needed meanwhile. What `ogr2ogr`
-    /// warned of.
+    /// Writes a copy with moved vertices and returns the warnings of `ogr2ogr`; `work` is a folder
+    /// for temporary files.
     pub fn write(&self, staged: &Staged, work: &Path, file: &Path, moves: Moves) -> Result<Vec<String>> {
         if self.driver == "FlatGeobuf" {
             flatgeobuf::write(&self.path, file, moves)?;

@@ -1,4 +1,4 @@
-//! The list of recipients: a CSV file with a header `recipient`, or of one column.
+//! The list of recipients: a CSV file with a column `recipient`, or of a single column.
 
 use crate::{Error, Result};
 use csv::{ReaderBuilder, StringRecord, Trim};
@@ -6,8 +6,8 @@ use std::{collections::BTreeSet, fs::File, io::Read, path::Path};
 
 const HEADER: &str = "recipient";
 
-/// What else a header may be called, in any case and in the plural too. In a list of one column such a word could be
-/// somebody's name.
+/// Words that may be a header, in any case and also in the plural. In a list of one column such a
+/// word may also be the name of a recipient.
 const LIKE_HEADERS: &[&str] = &[
     "recipient name",
     "recipient_name",
@@ -28,13 +28,14 @@ const LIKE_HEADERS: &[&str] = &[
     "subscriber",
 ];
 
-/// What spreadsheets put between columns.
+/// Delimiters that spreadsheets write between columns.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
 
-/// A list is a few megabytes; a mistaken /dev/zero has no end.
+/// A list has a few megabytes; the limit stops endless input such as /dev/zero.
 const LONGEST_LIST: u64 = 64 << 20;
 
-/// Reads the recipients in their order, each once, without blank lines; `warn` hears of those given again.
+/// Reads the recipients in their order, each once, without blank lines; `warn` receives the
+/// repeated ones.
 pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     let name = path.display();
     let bad = |reason: String| Error::Recipients { path: path.into(), reason };
@@ -82,7 +83,7 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     }
 }
 
-/// Which column of the first row is headed as that of the recipients; none without a header.
+/// Returns the column of the recipients according to the first row; none without a header.
 fn column(line: usize, first: &StringRecord) -> std::result::Result<Option<usize>, String> {
     let mut headers = first.iter().enumerate().filter(|(_, field)| is_header(field));
     match (headers.next(), headers.next()) {
@@ -107,7 +108,7 @@ fn reads_like_a_header(field: &str) -> bool {
     LIKE_HEADERS.contains(&word(field).as_str())
 }
 
-/// A header's word in lower case and the singular, without what may stand around it.
+/// Returns the word of a header in lower case and the singular, without surrounding punctuation.
 fn word(field: &str) -> String {
     let is_around = |c: char| c.is_whitespace() || "#:*\"'".contains(c);
     let word = field.trim_matches(is_around).to_lowercase();
@@ -118,7 +119,8 @@ fn word(field: &str) -> String {
     }
 }
 
-/// Lines and what they hold, separated by what makes a header of the first one, else by commas.
+/// Returns lines and their fields. The delimiter is the one that gives the first line a header,
+/// otherwise the comma.
 fn rows(text: &[u8]) -> std::result::Result<Vec<(usize, StringRecord)>, String> {
     let all = DELIMITERS.map(|delimiter| rows_between(text, delimiter));
     let has_header = |rows: &std::result::Result<Vec<(usize, StringRecord)>, String>| {
@@ -132,7 +134,7 @@ fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, S
     let mut reader = ReaderBuilder::new();
     let mut reader =
         reader.has_headers(false).flexible(true).trim(Trim::All).delimiter(delimiter).from_reader(text);
-    // The reader counts a line before it skips the empty ones ahead of it.
+    // The reader counts a line before it skips the empty lines ahead of it.
     let (mut counted, mut line) = (0, 1);
     let mut line_at = |position: Option<&csv::Position>| {
         let start = position.map_or(0, |at| at.byte() as usize);
@@ -158,7 +160,7 @@ fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, S
 mod tests {
     use super::*;
 
-    /// The recipients, and the warnings or the error.
+    /// Returns the recipients, and the warnings or the error.
     fn parse(text: &[u8]) -> (Vec<String>, String) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("list.csv");

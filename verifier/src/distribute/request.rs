@@ -1,11 +1,11 @@
-//! What `meshmark distribute` is asked for.
+//! The request of `meshmark distribute`.
 
 use meshmark_core::{key::SecretKey, options::Options};
 use std::path::PathBuf;
 
-/// What to distribute, to whom, and how it is marked.
+/// The map to distribute, its recipients, and the marking options.
 pub struct DistributeRequest {
-    /// The key.
+    /// The secret key.
     pub key: SecretKey,
     /// The marking options, without a subject.
     pub options: Options,
@@ -13,8 +13,8 @@ pub struct DistributeRequest {
     pub map: PathBuf,
     /// The list of recipients.
     pub recipients: PathBuf,
-    /// Where the copies go.
+    /// The folder of the copies.
     pub folder: PathBuf,
-    /// GDAL's short name of their format.
+    /// GDAL's short name of the format of the copies.
     pub format: String,
 }

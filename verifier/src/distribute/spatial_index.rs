@@ -1,25 +1,27 @@
-//! The spatial index of a layer: an R-tree in tables whose nodes SQLite lays out as its rtree.c says.
+//! The spatial index of a layer: an R-tree in tables, whose nodes have the layout of SQLite's
+//! rtree.c.
 //!
-//! After a shift of a metre at most the tree is as good as it was, once its boxes fit again, from the leaves up.
-//! That takes a small part of the time of a new tree.
+//! After shifts of a metre at most the tree stays efficient, once its boxes are adapted from the
+//! leaves up. This takes a small part of the time of a new tree.
 
 use super::staged::{Done, Layer};
 use meshmark_dataset::geopackage::Bounds;
 use rusqlite::{Connection, blob::Blob};
 
-/// The node at the top; its first two bytes say how many levels are below.
+/// The root node; its first two bytes hold the number of levels below it.
 const ROOT: i64 = 1;
-/// What a node begins with: that, and how many cells it has, 16 bits each.
+/// Size of the header of a node: the number of levels and the number of cells, 16 bits each.
 const HEADER: usize = 4;
-/// The id of a feature or the number of a node, 64 bits, and its box, four times 32.
+/// Size of a cell: a feature id or node number of 64 bits, and a box of four 32-bit values.
 const CELL: usize = 24;
 
-/// A box as it is stored: least x, largest x, least y, largest y.
+/// A stored box: least x, largest x, least y, largest y.
 type Stored = [f32; 4];
 
 const NOTHING: Stored = [f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY];
 
-/// Makes the boxes fit features that have moved: `bounds` of all that are in the index, ascending by their ids.
+/// Adapts the boxes to moved features. `bounds` has all features of the index, ascending by feature
+/// id.
 pub fn fit(connection: &Connection, layer: &Layer, bounds: &[(i64, Bounds)]) -> Done<()> {
     let table = format!("rtree_{}_{}_node", layer.name, layer.column);
     let mut nodes = connection.blob_open(c"main", table.as_str(), "data", ROOT, false)?;
@@ -30,7 +32,7 @@ pub fn fit(connection: &Connection, layer: &Layer, bounds: &[(i64, Bounds)]) -> 
     Ok(())
 }
 
-/// The box around all of a node, which has so many levels below.
+/// Adapts a node that has this many levels below it, and returns the box around it.
 fn fit_node(nodes: &mut Blob, number: i64, levels: u16, bounds: &[(i64, Bounds)]) -> Done<Stored> {
     nodes.reopen(number)?;
     let mut bytes = vec![0; nodes.len()];
@@ -58,7 +60,7 @@ fn of_feature(bounds: &[(i64, Bounds)], id: i64) -> Option<Bounds> {
     bounds.binary_search_by_key(&id, |(fid, _)| *fid).ok().map(|place| bounds[place].1)
 }
 
-/// Rounded so that it still holds what it held.
+/// Rounds a box outwards to 32 bits, so that it contains the original one.
 fn outward(bounds: Bounds) -> Stored {
     let rounded = bounds.map(|value| value as f32);
     std::array::from_fn(|side| match f64::from(rounded[side]) {

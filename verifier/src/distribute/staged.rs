@@ -1,4 +1,5 @@
-//! The staged GeoPackage: the unmarked map all copies are made of, and which vertex each of its coordinates is.
+//! The staged GeoPackage: the unmarked map that all copies start from, with the vertex of every
+//! coordinate.
 
 use crate::{Error, Result};
 use meshmark_core::vertices::VertexTable;
@@ -9,33 +10,33 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What SQLite or a geometry is to blame for.
+/// The result of a step in which SQLite or a geometry can fail.
 pub type Done<T> = std::result::Result<T, Box<dyn error::Error>>;
 
-/// A GeoPackage that `ogr2ogr` made.
+/// A GeoPackage made by `ogr2ogr`.
 pub struct Staged {
-    /// Where it is.
+    /// The path of the file.
     pub path: PathBuf,
-    /// Its layers whose geometries move.
+    /// The layers whose geometries move.
     pub layers: Vec<Layer>,
 }
 
 /// A layer whose geometries move.
 pub struct Layer {
-    /// Its name, which is that of its table.
+    /// The name of the layer and of its table.
     pub name: String,
-    /// The column of its geometries.
+    /// The column of the geometries.
     pub column: String,
-    /// Whether it has a spatial index.
+    /// Whether the layer has a spatial index.
     pub has_index: bool,
-    /// The features that have a geometry, ascending.
+    /// The ids of the features that have a geometry, ascending.
     pub fids: Vec<i64>,
-    /// The vertex of every coordinate, feature by feature.
+    /// The vertex index of every coordinate, feature by feature.
     vertices: Vec<u32>,
 }
 
 impl Staged {
-    /// Reads which of the vertices are where, of the layers that are `marked`.
+    /// Reads the vertex of every coordinate in the layers that `marked` selects.
     pub fn read(path: PathBuf, vertices: &VertexTable, marked: impl Fn(&str) -> bool) -> Result<Self> {
         let layers = || -> Done<Vec<Layer>> {
             let connection = open(&path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
@@ -52,7 +53,7 @@ impl Staged {
         }
     }
 
-    /// The layer of this name, if it moves.
+    /// Returns the layer of this name, if its geometries move.
     pub fn layer(&self, name: &str) -> Option<&Layer> {
         self.layers.iter().find(|layer| layer.name == name)
     }
@@ -84,13 +85,15 @@ impl Layer {
         Ok(Layer { name, column, has_index, fids, vertices })
     }
 
-    /// Where its coordinates go, feature by feature, when the vertices go `to` these places.
+    /// Returns the new place of every coordinate, feature by feature; `to` are the new places of
+    /// the vertices.
     pub fn places<'a>(&'a self, to: &'a [[f64; 2]]) -> impl Iterator<Item = [f64; 2]> + 'a {
         self.vertices.iter().map(|&vertex| to[vertex as usize])
     }
 }
 
-/// The words of a GeoJSON file came with the map, and with them its unmarked extent.
+/// Removes places from the native data of a GeoJSON source, which otherwise reveal the unmarked
+/// extent.
 fn clear_native_data(path: &Path) -> Done<()> {
     const BEGIN: &str = "<MDI key=\"NATIVE_DATA\">";
     const END: &str = "</MDI>";

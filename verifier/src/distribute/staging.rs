@@ -1,4 +1,4 @@
-//! What all copies are made of: the map as `ogr2ogr` copies it, and a GeoPackage whose geometries move.
+//! The base of all copies: the map as `ogr2ogr` copies it, and a GeoPackage whose geometries move.
 
 use super::{ogr2ogr, plain::Plain, request::DistributeRequest, staged::Staged};
 use crate::{Error, Result, inputs::maps};
@@ -9,18 +9,18 @@ use gdal::{
 use meshmark_dataset::{Error as MapError, Survey, formats::Format, parse_srs, workplace::Workplace};
 use std::path::Path;
 
-/// What all copies are made of.
+/// The base of all copies.
 pub struct Stage {
-    /// The unmarked map: all of it where copies are GeoPackages, else its geometries.
+    /// The unmarked map: completely where copies are GeoPackages, otherwise its geometries alone.
     pub staged: Staged,
-    /// All else of the map, unless copies are GeoPackages.
+    /// The other parts of the map, unless copies are GeoPackages.
     pub plain: Option<Plain>,
-    /// The names of the map's layers.
+    /// The names of the layers of the map.
     pub layers: Vec<String>,
 }
 
 impl Stage {
-    /// Copies the map; `warn` hears what `ogr2ogr` warns of.
+    /// Copies the map; `warn` receives the warnings of `ogr2ogr`.
     pub fn new(
         request: &DistributeRequest,
         format: &'static Format,
@@ -56,7 +56,7 @@ impl Stage {
     }
 }
 
-/// Refuses what the format would hold otherwise.
+/// Refuses a map that the format cannot hold unchanged.
 fn check_fits(
     request: &DistributeRequest,
     format: &'static Format,
@@ -79,14 +79,14 @@ fn check_fits(
     }
 }
 
-/// The geometries of a layer, in its order, as a GeoPackage.
+/// Copies the geometries of a layer, in its order, to a GeoPackage.
 fn copy_geometries(mut layer: Layer, path: &Path) -> gdal::errors::Result<()> {
     let mut staged = DriverManager::get_driver_by_name("GPKG")?.create_vector_only(path)?;
     let (srs, ty) = (layer.spatial_ref(), layer.defn().geometry_type());
     let options = Some(&["SPATIAL_INDEX=NO"][..]);
     let mut transaction = staged.start_transaction()?;
     let to = transaction.create_layer(LayerOptions { name: "map", srs: srs.as_ref(), ty, options })?;
-    layer.reset_feature_reading(); // it was read to its end before
+    layer.reset_feature_reading(); // an earlier reading reached its end
     for feature in layer.features() {
         let mut copy = Feature::new(to.defn())?;
         if let Ok(geometry) = feature.geometry_by_index(0) {

@@ -1,4 +1,4 @@
-//! A copy: written, read back, published.
+//! Writing of a copy: it is written, read back and published.
 
 use super::{copies::MarkedCopy, moving, staging::Stage};
 use crate::{
@@ -22,7 +22,7 @@ use meshmark_dataset::{
 };
 use std::{collections::BTreeSet, ffi::OsStr, fs, path::Path, sync::Mutex};
 
-/// What all copies are made of.
+/// The input that all copies share.
 pub struct Job<'a> {
     pub key: &'a SecretKey,
     pub options: &'a Options,
@@ -32,7 +32,7 @@ pub struct Job<'a> {
     pub format: &'static Format,
     pub stage: &'a Stage,
     pub folder: &'a Path,
-    /// What was said while copies were written, each once.
+    /// The warnings during writing, each once.
     pub warnings: Mutex<BTreeSet<String>>,
 }
 
@@ -55,7 +55,8 @@ pub fn write(job: &Job, copy: &MarkedCopy, moved: &[[f64; 2]], distortion: Disto
     publish(copy, &workplace, &folder, &record.to_json(), job.format)
 }
 
-/// Fails unless the file holds the features of the staged map, moved, within the precision of its format.
+/// Checks that the file holds the features of the staged map, moved, within the precision of its
+/// format.
 fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
     let driver = job.format.driver;
     let (staged, file) = (open(&job.stage.staged.path, "GPKG")?, open(path, driver)?);
@@ -69,7 +70,7 @@ fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
             last_failure: &last_failure,
         };
         let compared = match (moving, in_file) {
-            // Its features are in the same order, and which vertices they have is known.
+            // Its features have the order of the staged map, whose vertices are identified.
             (Some(moving), Ok(in_file)) if driver == "GPKG" => {
                 comparison.in_order(in_file, moving.places(moves.to))
             }
@@ -83,7 +84,7 @@ fn check(job: &Job, path: &Path, moves: Moves) -> Result<()> {
     Ok(())
 }
 
-/// Puts the record and the files in `folder` into their places, the main file last.
+/// Moves the record and the files in `folder` into place, the main file last.
 fn publish(
     copy: &MarkedCopy,
     workplace: &Workplace,
@@ -92,7 +93,8 @@ fn publish(
     format: &Format,
 ) -> Result<()> {
     let mut publication = Publication::default();
-    // Without links and from the root: who takes a publication back may be elsewhere.
+    // The path is absolute and has no links, as another process with another working directory may
+    // undo the publication.
     let places = workplace.folder().parent().expect("a workplace is in a folder");
     let place = |name: Option<&OsStr>| places.join(name.expect("a copy has a name"));
     let is_there = fs::read(&copy.record).is_ok_and(|bytes| bytes == record.as_bytes());

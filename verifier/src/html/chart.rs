@@ -11,16 +11,16 @@ use std::fmt::Write as _;
 
 const WIDTH: f64 = 480.0;
 const HEIGHT: f64 = 150.0;
-/// Beyond this a score is drawn after a break of the axis.
+/// A score beyond this is drawn after a break of the axis.
 const FARTHEST: f64 = 40.0;
 
-/// A histogram with room for what else belongs on its axis.
+/// A histogram with room on its axis for further marks.
 pub struct Chart<'a> {
     pub histogram: &'a Histogram,
     /// Ends of the axis.
     pub from: f64,
     pub to: f64,
-    /// Of the axis.
+    /// Label of the axis.
     pub label: &'a str,
 }
 
@@ -63,7 +63,7 @@ impl Chart<'_> {
     }
 }
 
-/// A line across a chart with a name at its top.
+/// Draws a line across a chart, with a name at its top.
 fn line(x: f64, name: &str) -> Markup {
     let (side, beside) = if x > WIDTH / 2.0 { ("before", x - 7.0) } else { ("after", x + 7.0) };
     html! {
@@ -73,7 +73,7 @@ fn line(x: f64, name: &str) -> Markup {
     }
 }
 
-/// The score against those of decoys.
+/// Draws the score and those of decoys.
 pub fn decoys(report: &Report) -> Markup {
     let content = match &report.decoys {
         None => html! { p { "Nothing was demodulated, or nothing moved, so no key has a score." } },
@@ -114,7 +114,7 @@ pub fn decoys(report: &Report) -> Markup {
     section("The score against chance", &content)
 }
 
-/// What the histogram would be if its law held exactly.
+/// Returns the path of the histogram that the normal distribution predicts.
 fn normal(chart: &Chart, count: usize) -> String {
     let height = |x: f64| {
         let density = (-x * x / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt();

@@ -1,4 +1,4 @@
-//! What was compared, with what identifies it, and the records that were tried.
+//! The compared files with their digests, and the records that were tried.
 
 use super::{
     page::{count, section, sentence, table},
@@ -39,7 +39,7 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
     ])
 }
 
-/// Of the records that were tried, one is named only when it matches.
+/// Returns the recipient. Among the records that were tried, only a matching one is named.
 fn recipient(report: &Report) -> Option<Markup> {
     let is_named = report.candidates.is_none() || report.verdict == Verdict::Match;
     let recipient = report.parameters.recipient.as_ref().filter(|_| is_named)?;
@@ -65,7 +65,7 @@ fn record(report: &Report, record: Option<&Digested>) -> Markup {
     }
 }
 
-/// How the mark was assumed to be made, and how it was tested.
+/// Renders the assumed parameters of the mark, and those of the test.
 pub fn settings(report: &Report) -> Markup {
     let p = &report.parameters;
     let text = |text: String| Some(html! { (text) });
@@ -97,7 +97,7 @@ pub fn settings(report: &Report) -> Markup {
     section("How the mark was assumed to be made and tested", &content)
 }
 
-/// The word that the JSON has.
+/// Returns the name of a value in the JSON report.
 fn word(value: &impl serde::Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|v| v.as_str().map(String::from)).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! The report of a comparison: what marking did to a map, and where.
+//! The report of a comparison: the effect of marking on a map, and its places.
 
 use super::{
     chart::Chart,
@@ -14,7 +14,7 @@ use maud::{Markup, html};
 use meshmark_detection::Histogram;
 use std::fmt::Write as _;
 
-/// Degrees from which a cell is of a class.
+/// Classes of cells by the change of their angles, degrees from which a class begins.
 const CLASSES: [(f64, &str, &str); 4] = [
     (NOTABLE_DEG, "e0", "1° to 2°"),
     (2.0, "e1", "2° to 5°"),
@@ -22,7 +22,8 @@ const CLASSES: [(f64, &str, &str); 4] = [
     (10.0, "e3", "10° or more"),
 ];
 
-/// What marking did to a map. What it does not hold (see [`Comparison::detail`]) is left out.
+/// Renders the report of a comparison, without the parts that it lacks (see
+/// [`Comparison::detail`]).
 pub fn comparison(comparison: &Comparison) -> String {
     let detail = comparison.detail.as_ref();
     let provenance = detail.and_then(|detail| detail.provenance.as_ref());
@@ -191,7 +192,7 @@ fn maps(detail: &Detail) -> Markup {
     html! { (angles(detail, &frame)) (moved(detail, &frame)) }
 }
 
-/// Cells by how much their angles turned, and marks where the topology changed.
+/// Draws cells by the change of their angles, and the places of changed topology.
 fn angles(detail: &Detail, frame: &Frame) -> Markup {
     let t = &detail.topology;
     let class = |change: f64| {
@@ -237,7 +238,7 @@ fn angles(detail: &Detail, frame: &Frame) -> Markup {
 
 type Kind = (&'static str, &'static str, fn(&Topology) -> &[[f64; 2]], &'static str);
 
-/// Class, shape, places and name of what may happen to the topology.
+/// Class, shape, places and name of the kinds of topology change.
 const KINDS: [Kind; 4] = [
     ("missing", "m-30-30l60 60m0-60l-60 60", |t| &t.crossings, "crossing new or lost"),
     ("inserted", "m0-36l34 60h-68z", |t| &t.overlaps, "new overlap"),

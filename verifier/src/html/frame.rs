@@ -1,4 +1,4 @@
-//! From CRS units to the page: whole numbers, 4000 along the longer side.
+//! The page frame: converts CRS units to whole page units, 4000 along the longer side.
 
 use crate::report::sketch::Extent;
 use maud::{Markup, html};
@@ -6,11 +6,11 @@ use meshmark_detection::round_up;
 use std::fmt::Write as _;
 
 const SIDE: f64 = 4000.0;
-/// Room for the scale under the map.
+/// Height of the strip for the scale under the map.
 const FOOT: f64 = 230.0;
-/// Points of rings and lines from which a map is dark with them.
+/// From this number of points of rings and lines on, a map is drawn fainter.
 const DENSE: usize = 10_000;
-/// White around it.
+/// White margin around the map.
 const MARGIN: f64 = 30.0;
 
 pub struct Frame {
@@ -26,19 +26,19 @@ impl Frame {
         let [width_m, height_m] = extent.size_m();
         let longer_m = width_m.max(height_m);
         let per_metre = if longer_m > 0.0 { SIDE / longer_m } else { 1.0 };
-        // Narrow maps get room for their scale.
+        // Narrow maps need room for their scale.
         let width = (width_m * per_metre).max(SIDE / 2.0);
         Frame { extent: *extent, per_metre, width, height: (height_m * per_metre).max(SIDE / 20.0) }
     }
 
-    /// Where a place is on the page.
+    /// Returns the page coordinates of a place in CRS units.
     pub fn at(&self, place: [f64; 2]) -> [i64; 2] {
         let metres =
             [0, 1].map(|axis| (place[axis] - self.extent.lower[axis]) * self.extent.metres_per_unit[axis]);
         [metres[0] * self.per_metre, self.height - metres[1] * self.per_metre].map(|v| v.round() as i64)
     }
 
-    /// Page units of a length in metres.
+    /// Returns a length in metres as page units.
     pub fn length(&self, metres: f64) -> f64 {
         metres * self.per_metre
     }
@@ -48,7 +48,7 @@ impl Frame {
         format!("{} {} {w:.0} {h:.0}", -MARGIN, -MARGIN)
     }
 
-    /// Relative to a line's start, as path data.
+    /// Returns lines as path data, relative to the start of each line.
     pub fn path<'a>(&self, lines: impl Iterator<Item = &'a Vec<[f64; 2]>>, closed: bool) -> String {
         let mut path = String::new();
         for line in lines {
@@ -69,13 +69,14 @@ impl Frame {
         path
     }
 
-    /// The rings and lines of a map, to be used again as `#lines`; fainter where they would cover what lies under them.
+    /// Draws the rings and lines of a map, for reuse as `#lines`; they are fainter where they would
+    /// cover other content.
     pub fn lines(&self, lines: &[Vec<[f64; 2]>]) -> Markup {
         let points: usize = lines.iter().map(Vec::len).sum();
         html! { path #lines class=[(points > DENSE).then_some("dense")] d=(self.path(lines.iter(), false)) {} }
     }
 
-    /// A scale bar, and beside it what else the foot shows, drawn from (0, 0) to the right.
+    /// Draws a scale bar and, beside it, further content that extends from (0, 0) to the right.
     pub fn foot(&self, more: Option<&Markup>) -> Markup {
         let bar_m = largest_below(self.width / 3.0 / self.per_metre);
         let bar = self.length(bar_m);
@@ -92,12 +93,13 @@ impl Frame {
     }
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is not above a positive value.
+/// Returns the largest of 1, 2 and 5 times a power of ten that is at most `value`, which is
+/// positive.
 pub fn largest_below(value: f64) -> f64 {
     1.0 / round_up(1.0 / value)
 }
 
-/// "20 m", "5 km", "0.1 m".
+/// Formats a length, for example "20 m", "5 km" or "0.1 m".
 pub fn metres(length_m: f64) -> String {
     match length_m {
         1000.0.. => format!("{} km", rounded(length_m / 1000.0)),
@@ -106,7 +108,7 @@ pub fn metres(length_m: f64) -> String {
     }
 }
 
-/// Without the digits that arithmetic left.
+/// Removes the digits of rounding errors.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

@@ -1,4 +1,5 @@
-//! What the finding does not say, what would weaken it, what makes it evidence, and how to repeat it.
+//! The limits of the finding: what it leaves open, what weakens it, what makes it evidence, and how
+//! to repeat it.
 
 use super::page::{count, counted, section};
 use crate::report::{Report, explain};
@@ -28,7 +29,8 @@ fn list(sentences: &[String]) -> Markup {
     html! { ul { @for text in sentences { li { (text) } } } }
 }
 
-/// From two to five standard errors, so that honest reports hardly ever show it.
+/// A deviation of decoy scores by this many standard errors is reported; honest decoys rarely reach
+/// it.
 const STANDARD_ERRORS: f64 = 5.0;
 
 fn weaknesses(report: &Report) -> Vec<String> {
@@ -71,7 +73,7 @@ fn weaknesses(report: &Report) -> Vec<String> {
     found
 }
 
-/// What this very report shows.
+/// Returns weaknesses that this report shows.
 fn seen(report: &Report) -> Vec<String> {
     let mut found = Vec::new();
     let v = &report.vertices;

@@ -1,4 +1,4 @@
-//! Where on the map the evidence is: patches by their own evidence, vertices and how far they moved.
+//! The evidence on the map: patches with their scores, vertices with their displacements.
 
 use super::{
     frame::{Frame, largest_below, metres},
@@ -9,10 +9,11 @@ use maud::{Markup, html};
 use meshmark_detection::decision::Verdict;
 use std::fmt::Write as _;
 
-/// With more patches their scores are no longer readable.
+/// With more patches the numbers of their scores are illegible.
 const MOST_NUMBERED: usize = 60;
 
-/// Standard deviations from which a patch is of a class: its name and what it says.
+/// Classes of patches: the score from which a class begins, standard deviations, its name and its
+/// meaning.
 const CLASSES: [(f64, &str, &str); 5] = [
     (f64::NEG_INFINITY, "against", "below 0: speaks against"),
     (0.0, "e0", "0 to 2: says nothing by itself"),
@@ -32,7 +33,7 @@ pub fn evidence(report: &Report) -> Markup {
     section("Where on the map the evidence is", &content)
 }
 
-/// Hatching, so that nothing rests on colour alone.
+/// Returns hatching patterns, so that no distinction depends on colour alone.
 fn patterns() -> Markup {
     let lines = |id: &str, path: &str| {
         html! {
@@ -162,13 +163,13 @@ pub fn marks(frame: &Frame, places: &[[f64; 2]], shape: &str) -> String {
     path
 }
 
-/// Displacements as arrows, longer than they are.
+/// Displacements as arrows, drawn at an enlarged scale.
 pub struct Arrows {
     times: f64,
     rms_m: f64,
 }
 
-/// Length of an ordinary arrow, page units.
+/// Length of an arrow of typical displacement, page units.
 const ORDINARY: f64 = 75.0;
 
 impl Arrows {
@@ -180,7 +181,7 @@ impl Arrows {
         Arrows { times, rms_m }
     }
 
-    /// `vertices`: place, CRS units, and displacement, metres.
+    /// Returns arrows as path data; `vertices` holds places, CRS units, and displacements, metres.
     pub fn path(&self, frame: &Frame, vertices: &[[f64; 4]]) -> String {
         let mut path = String::new();
         for [x, y, dx, dy] in vertices {
@@ -190,26 +191,26 @@ impl Arrows {
         path
     }
 
-    /// One arrow from where the pen is.
+    /// Returns one arrow from the current point.
     fn arrow(&self, frame: &Frame, displacement_m: [f64; 2]) -> String {
         let [dx, dy] = displacement_m.map(|d| frame.length(d) * self.times);
         let (length, dy) = (dx.hypot(dy), -dy);
         if length < 4.0 {
             return "h0".into();
         }
-        // Half of an arrowhead on either side of the shaft.
+        // Half of the arrowhead is on either side of the shaft.
         let head = (length / 3.0).min(26.0) / length;
         let side = |sign: f64| [head * (-dx - sign * 0.5 * dy), head * (-dy + sign * 0.5 * dx)];
         let ([ax, ay], [bx, by]) = (side(1.0), side(-1.0));
         format!("l{dx:.0} {dy:.0}l{ax:.0} {ay:.0}m{:.0} {:.0}l{bx:.0} {by:.0}", -ax, -ay)
     }
 
-    /// To end a sentence with.
+    /// Returns the end of a sentence that gives the enlargement.
     pub fn scale(&self) -> Markup {
         html! { @if self.times > 1.0 { ", drawn " (count(self.times as usize)) " times as long as it is" } }
     }
 
-    /// An arrow of a round length and how long it is.
+    /// Draws an arrow of a round length with its length in metres.
     pub fn key(&self, frame: &Frame) -> Option<Markup> {
         let length_m = largest_below(2.0 * self.rms_m.max(f64::MIN_POSITIVE));
         let end = frame.length(length_m) * self.times;

@@ -1,13 +1,13 @@
-//! The message bit by bit, with how sure each bit is.
+//! The message bit by bit, with the odds of each bit.
 
 use super::page::{count, figure, section, sentence};
 use crate::report::{Report, text::certainty};
 use maud::{Markup, html};
 
-/// Bits in a row.
+/// Number of bits in a row.
 const ROW: usize = 16;
 
-/// From which odds a bit is of a class.
+/// Classes of bits by the odds from which a class begins.
 const CLASSES: [(f64, &str, &str); 4] = [
     (0.0, "s0", "a guess: less than 3 to 1"),
     (3.0, "s1", "3 to 1 or better"),
@@ -88,7 +88,7 @@ fn legend(report: &Report) -> Markup {
     }
 }
 
-/// Of hexadecimal digits, the first bit of the first digit first.
+/// Returns the bits of hexadecimal digits, the most significant bit of each digit first.
 fn bits_of(hex: &str) -> Vec<bool> {
     let digits = hex.chars().map(|c| c.to_digit(16).unwrap_or_default());
     digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).collect()

@@ -1,5 +1,5 @@
-//! The report as a page: one HTML file without scripts that needs nothing else. It shows what the JSON report
-//! says, and works nothing out that is not in it.
+//! The report as a page: one self-contained HTML file without scripts. It shows the content of the
+//! JSON report and computes nothing beyond it.
 
 mod chart;
 mod compared;
@@ -19,7 +19,8 @@ use crate::report::Report;
 use maud::html;
 use page::page;
 
-/// The report of a verification. What it does not hold (see [`Report::evidence`]) is left out.
+/// Renders the report of a verification, without the parts that it lacks (see
+/// [`Report::evidence`]).
 pub fn verification(report: &Report) -> String {
     let body = html! {
         (verdict::verdict(report))

@@ -1,8 +1,8 @@
-//! What pages are made of: sections, figures, tables, counts.
+//! The elements of pages: sections, figures, tables, counts.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// A whole page.
+/// Renders a complete page.
 pub fn page(title: &str, software: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -25,17 +25,17 @@ pub fn page(title: &str, software: &str, body: &Markup) -> String {
     page.into_string() + "\n"
 }
 
-/// A part of the page under a heading.
+/// Renders a section under a heading.
 pub fn section(title: &str, content: &Markup) -> Markup {
     html! { section { h2 { (title) } (content) } }
 }
 
-/// A picture and what it shows.
+/// Renders a drawing with its caption.
 pub fn figure(drawing: &Markup, caption: &Markup) -> Markup {
     html! { figure { (drawing) figcaption { (caption) } } }
 }
 
-/// Rows of a name and a value; rows without a value are left out.
+/// Renders rows of a name and a value, without the rows that lack a value.
 pub fn table(rows: &[(&str, Option<Markup>)]) -> Markup {
     html! {
         table.facts { tbody {
@@ -46,7 +46,7 @@ pub fn table(rows: &[(&str, Option<Markup>)]) -> Markup {
     }
 }
 
-/// A count, in groups of three digits from 10 000 on.
+/// Formats a count, in groups of three digits from 10 000 on.
 pub fn count(number: usize) -> String {
     let digits = number.to_string();
     if number < 10_000 {
@@ -57,14 +57,14 @@ pub fn count(number: usize) -> String {
     groups.join("\u{202f}")
 }
 
-/// A number and its noun, which is given in the singular.
+/// Formats a number with its noun, which is given in the singular.
 pub fn counted(number: usize, noun: &str) -> String {
     let words = meshmark_core::counted(number, noun);
     let (_, noun) = words.split_once(' ').expect("a number and a noun");
     format!("{} {noun}", count(number))
 }
 
-/// `text` as one of the document's own: sentences of the explanation are complete, and begin with a capital letter.
+/// Renders `text` as a complete sentence, which begins with a capital letter.
 pub fn sentence(text: &str) -> Markup {
     html! { (text) " " }
 }

@@ -1,4 +1,4 @@
-//! How the suspect was brought onto the reference, and what was left.
+//! The registration of the suspect, and its residuals.
 
 use super::{
     chart::Chart,
@@ -43,7 +43,7 @@ pub fn registration(report: &Report) -> Markup {
     section("How the maps were brought together", &content)
 }
 
-/// With a minus sign, and none before zero.
+/// Formats a value with a minus sign, which zero lacks.
 fn signed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.chars().all(|c| "-0.".contains(c));

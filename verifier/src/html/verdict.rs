@@ -1,4 +1,4 @@
-//! The verdict in one sentence, and the figures behind it.
+//! The verdict in one sentence, with its figures.
 
 use super::{page::count, words};
 use crate::{
@@ -67,7 +67,7 @@ fn sentence(report: &Report) -> Markup {
     }
 }
 
-/// Whose mark it is about.
+/// Names the mark in question.
 fn mark(report: &Report) -> Markup {
     let p = &report.parameters;
     let several = report.candidates.as_ref().map(|c| if c.matches > 0 { c.matches } else { c.tried });

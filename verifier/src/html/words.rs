@@ -1,14 +1,15 @@
-//! Probabilities as people say them.
+//! Probabilities in words.
 
 use super::page::count;
 use maud::{Markup, html};
 
-/// How often chance does as well, in words and number, to end a sentence with: "in about 43 of 100 tries".
+/// Returns the frequency of an equally good result by chance, in words and number, to end a
+/// sentence: "in about 43 of 100 tries".
 pub fn how_often(p_log10: f64) -> Markup {
     if p_log10 > -2.0 {
         return html! { (format!("in about {:.0} of 100 tries", 100.0 * 10f64.powf(p_log10))) };
     }
-    // Rounded against the verdict: there are at least so many tries.
+    // The number of tries is rounded down, against the verdict.
     let power = (-p_log10 + 1e-9).floor();
     let digit = (10f64.powf(-p_log10 - power) + 1e-6).floor();
     let (digit, power) = (digit as usize, power as usize);
@@ -27,12 +28,13 @@ pub fn how_often(p_log10: f64) -> Markup {
     }
 }
 
-/// None for numbers that nobody has a word for.
+/// Returns a number in words; none where no common word exists.
 fn in_words(digit: usize, power: usize) -> Option<String> {
     const DIGITS: [&str; 10] = ["", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
     const TENS: [&str; 10] =
         ["", "ten", "twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"];
-    // No billion: it is a thousand million in one country and a million million in another.
+    // "Billion" is avoided, as it means a thousand million in some countries and a million million
+    // in others.
     let unit = match power / 3 {
         0 => "",
         1 => " thousand",
@@ -48,7 +50,7 @@ fn in_words(digit: usize, power: usize) -> Option<String> {
     })
 }
 
-/// "2.9 × 10⁻³⁹", or "0.043".
+/// Formats a probability, for example "2.9 × 10⁻³⁹" or "0.043".
 pub fn probability(p_log10: f64) -> Markup {
     if p_log10 > -3.0 {
         return html! { (format!("{:.3}", 10f64.powf(p_log10))) };

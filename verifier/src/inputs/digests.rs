@@ -1,4 +1,4 @@
-//! The files of a verification and what identifies them.
+//! The files of a verification and their digests.
 
 use crate::{Error, Result, words::printable};
 use meshmark_core::hex;
@@ -12,7 +12,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The files, digested before they are read as maps.
+/// The files, digested before GDAL reads them.
 #[derive(Debug, Clone, Serialize)]
 pub struct Inputs {
     /// The key.
@@ -21,16 +21,16 @@ pub struct Inputs {
     pub reference: Digested,
     /// The suspect.
     pub suspect: Digested,
-    /// The record, of many the best one; null without.
+    /// The record, or the best one of many; null without.
     pub record: Option<Digested>,
 }
 
-/// A file or folder and what identifies it.
+/// A file or folder and its digest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Digested {
-    /// Its path, as it was given.
+    /// The path as given.
     pub path: String,
-    /// "SHA-256 …", or why there is none.
+    /// "SHA-256 …", or the reason why there is none.
     pub digest: String,
 }
 
@@ -38,23 +38,23 @@ impl Inputs {
     /// Digests the files.
     ///
     /// # Errors
-    /// One of them cannot be read to its end.
+    /// Fails when one of them cannot be read to its end.
     pub fn read(key: &Path, reference: &Path, suspect: &Path) -> Result<Self> {
         let (key, reference, suspect) = (digest(key)?, digest(reference)?, digest(suspect)?);
         Ok(Inputs { key, reference, suspect, record: None })
     }
 
-    /// With the record.
+    /// Adds the digest of the record.
     ///
     /// # Errors
-    /// It cannot be read any more.
+    /// Fails when the record is no longer readable.
     pub fn with_record(self, record: Option<&Path>) -> Result<Self> {
         Ok(Inputs { record: record.map(digest).transpose()?, ..self })
     }
 }
 
-/// SHA-256 of a file; of a folder, or a file with companions of the same name, that of the sorted list of
-/// their digests as `sha256sum` prints it.
+/// Returns the SHA-256 of a file. For a folder, or a file with companions of the same name, it is
+/// that of the sorted list of their digests as `sha256sum` prints it.
 pub(crate) fn digest(path: &Path) -> Result<Digested> {
     let failed = |error: io::Error| Error::Undigested { path: path.into(), source: error };
     let shown = printable(&path.display().to_string());
@@ -78,10 +78,10 @@ pub(crate) fn digest(path: &Path) -> Result<Digested> {
     Ok(Digested { path: shown, digest })
 }
 
-/// Formats of several files with the same name.
+/// Extensions of formats that consist of several files with the same name.
 const WITH_COMPANIONS: &[&str] = &["shp", "shx", "dbf", "tab", "mif"];
 
-/// The files that make up a map, sorted.
+/// Returns the files of a map, sorted.
 fn files_of(path: &Path) -> io::Result<Vec<PathBuf>> {
     if path.is_file() {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -122,7 +122,7 @@ fn text_digest(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// SHA-256 of "abc" (FIPS 180-4).
+    /// This is the SHA-256 of "abc" (FIPS 180-4).
     const ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
 
     #[test]

@@ -10,19 +10,19 @@ use meshmark_dataset::{
 };
 use std::{collections::BTreeSet, path::Path};
 
-/// How to read a map.
+/// The way to read a map.
 pub struct Reading<'a> {
-    /// Layers that form it.
+    /// Layers that form the map; all without names.
     pub layers: Option<&'a [String]>,
-    /// Its CRS when it has none.
+    /// CRS of a map that has none.
     pub srs: Option<&'a str>,
-    /// Attributes to take as landmarks.
+    /// Attributes that become landmarks.
     pub landmarks: LabelFields<'a>,
-    /// Whether to keep its geometries.
+    /// Whether to keep the geometries.
     pub geometries: bool,
 }
 
-/// Reads the reference: any vector dataset GDAL opens.
+/// Reads the reference, which is any vector dataset that GDAL opens.
 pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     let dataset = open("reference", path, None)?;
     if let LabelFields::Named(names) = reading.landmarks {
@@ -31,7 +31,7 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, &dataset, reading, TargetCrs::Own)
 }
 
-/// Opens a map to be marked, and reads its vertices.
+/// Opens a map for marking, and reads its vertices.
 pub(crate) fn source(
     path: &Path,
     options: &Options,
@@ -48,7 +48,7 @@ pub(crate) fn source(
     Ok((dataset, survey))
 }
 
-/// The geometries of a map in order, for a comparison, and the first CRS of a layer.
+/// Returns the geometries of a map in order, for a comparison, and the first CRS of a layer.
 pub fn geometries(
     what: &'static str,
     path: &Path,
@@ -67,7 +67,7 @@ pub(super) fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
     dataset.layers().find_map(|layer| layer.spatial_ref()).and_then(CoordinateSystem::of_layer)
 }
 
-/// What the reference of a comparison is measured with.
+/// Returns the ground metric of the reference of a comparison.
 pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<ScaleLattice>)> {
     let survey =
         reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
@@ -78,7 +78,7 @@ pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<
     })
 }
 
-/// A misspelt field would leave no landmark, and nobody would know why.
+/// Checks the names of landmark fields, as a misspelt field would silently give no landmark.
 fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> {
     let fields_of = |layer: gdal::vector::Layer| layer.defn().fields().map(|f| f.name()).collect::<Vec<_>>();
     let known: BTreeSet<String> = dataset.layers().flat_map(fields_of).collect();
@@ -94,7 +94,7 @@ pub(super) fn open(what: &'static str, path: &Path, allowed_drivers: Option<&[&s
     }
     forget_failure();
     let mut open_options = marking::OPEN_OPTIONS.to_vec();
-    open_options.push("@WRITE_GFS=NO"); // a map that is read leaves nothing beside it
+    open_options.push("@WRITE_GFS=NO"); // reading a map creates no file beside it
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
         open_options: Some(&open_options),
@@ -109,7 +109,8 @@ pub(super) fn open(what: &'static str, path: &Path, allowed_drivers: Option<&[&s
     })
 }
 
-/// Whether a connection to a database says its password: as `password=…`, `pwd=…` or `scheme://user:password@host`.
+/// Returns whether the connection string of a database holds its password: as `password=…`, `pwd=…`
+/// or `scheme://user:password@host`.
 fn holds_password(path: &Path) -> bool {
     let text = path.to_string_lossy().to_lowercase();
     let of_url = || text.split_once("://").and_then(|(_, rest)| rest.split('/').next()?.split_once('@'));

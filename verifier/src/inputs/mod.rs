@@ -1,4 +1,5 @@
-//! What is read: maps, suspects, keys and records, with errors that name the file; and the digests of the files.
+//! Inputs: maps, suspects, keys and records, read with errors that name the file, and the digests
+//! of the files.
 
 pub mod digests;
 pub mod gdal_failures;

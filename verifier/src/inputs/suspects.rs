@@ -1,4 +1,4 @@
-//! Suspects, which may be made to mislead: local files of plain formats, read without network.
+//! Suspects, which may be manipulated: only local files of plain formats are read, without network.
 
 use super::maps::{Reading, failed, first_crs, open, read, survey_of};
 use crate::{Error, Result, words::printable};
@@ -9,8 +9,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What a suspect may be: local files of plain formats. No format that points at other data (VRT,
-/// SQL, network), for a suspect may be made to mislead; and not MESHMARK.
+/// The drivers for suspects: local files of plain formats. Formats that refer to other data (VRT,
+/// SQL, network) are excluded, as a suspect may be manipulated, and so is MESHMARK.
 const SUSPECT_DRIVERS: &[&str] = &[
     "GPKG",
     "ESRI Shapefile",
@@ -27,20 +27,21 @@ const SUSPECT_DRIVERS: &[&str] = &[
     "TopoJSON",
 ];
 
-/// A suspect as it was read.
+/// A suspect after reading.
 pub struct Suspect {
-    /// In the CRS of the reference, where both CRS are known and its coordinates make sense in its own.
+    /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
+    /// in its own.
     pub map: Survey,
-    /// Whether the numbers of `map` are as they stand in the file.
+    /// Whether the coordinates of `map` are unchanged from the file.
     pub is_raw: bool,
-    /// CRS of its layers.
+    /// CRS of the layers.
     pub layer_crs: Vec<String>,
     /// The first CRS of a layer.
     pub crs: Option<CoordinateSystem>,
 }
 
-/// Reads the suspect in the CRS of the reference, where both are known; its numbers as they stand when they
-/// cannot be brought there.
+/// Reads the suspect in the CRS of the reference, where both are known. Where reprojection fails,
+/// it reads the coordinates unchanged.
 pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
     let dataset = open_suspect(path)?;
     let layer_crs = crs_of(&dataset);
@@ -48,7 +49,8 @@ pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Sus
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
         match survey_of(&dataset, reading, TargetCrs::Crs(target)) {
             Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
-            // PROJ, or the limits of what a map may be: the CRS is not that of the coordinates.
+            // PROJ fails, or the map exceeds its limits, when the CRS is not that of the
+            // coordinates.
             Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
             Err(error) => return Err(failed("suspect", path, error)),
         }
@@ -57,7 +59,7 @@ pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Sus
     Ok(Suspect { map, is_raw: true, layer_crs, crs })
 }
 
-/// Reads the numbers of the suspect as they stand.
+/// Reads the coordinates of the suspect unchanged.
 pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
     read("suspect", path, &open_suspect(path)?, reading, TargetCrs::Raw)
 }
@@ -73,11 +75,11 @@ fn open_suspect(path: &Path) -> Result<Dataset> {
     Ok(dataset)
 }
 
-/// A suspect may name addresses: as the CRS of a GeoJSON file, as the schema of a GML file. Nobody shall learn
-/// from a request that it is being looked at, nor answer it.
+/// Prevents network access. A suspect may name addresses, as the CRS of a GeoJSON file or as the
+/// schema of a GML file; a request would reveal the examination, and its answer could falsify it.
 fn forbid_network() -> gdal::errors::Result<()> {
     for (option, value) in [
-        ("GDAL_HTTP_PROXY", "127.0.0.1:0"), // no one can listen there
+        ("GDAL_HTTP_PROXY", "127.0.0.1:0"), // no process can listen on port 0
         ("GDAL_HTTPS_PROXY", "127.0.0.1:0"),
         ("CPL_VSIL_CURL_ALLOWED_FILENAME", "none"),
         ("GML_DOWNLOAD_SCHEMA", "NO"),
@@ -91,7 +93,7 @@ fn forbid_network() -> gdal::errors::Result<()> {
     Ok(())
 }
 
-/// Refuses MapInfo tables that are made of others, which may be anywhere.
+/// Refuses MapInfo tables that refer to other tables, which may be anywhere.
 fn check_table(path: &Path) -> Result<()> {
     let is_table = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tab"));
     let tables: Vec<PathBuf> = match path.read_dir() {
@@ -99,7 +101,7 @@ fn check_table(path: &Path) -> Result<()> {
         Err(_) => is_table(path).then(|| path.into()).into_iter().collect(),
     };
     for table in tables.iter().filter(|table| table.is_file()) {
-        let Ok(bytes) = std::fs::read(table) else { continue }; // GDAL will say why
+        let Ok(bytes) = std::fs::read(table) else { continue }; // GDAL reports the reason later
         let text = String::from_utf8_lossy(&bytes).to_lowercase();
         let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
         if seamless || text.contains("create view") {
@@ -109,7 +111,7 @@ fn check_table(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Virtual tables that hold what is in the database itself; any other may point at other files.
+/// Virtual tables with their data in the database itself; all others may refer to other files.
 const PLAIN_MODULES: &[&str] = &[
     "rtree",
     "rtree_i32",
@@ -129,7 +131,7 @@ fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
     }
     let failed =
         |error: gdal::errors::GdalError| Error::Unread { path: path.into(), reason: error.to_string() };
-    // A forged schema may have any type, page and spacing; its text is what SQLite goes by.
+    // A forged schema may have any type, page and spacing, and SQLite uses only its text.
     let query = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
     let tables = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT).map_err(failed)?;
     let Some(mut tables) = tables else { return Ok(()) };
@@ -142,8 +144,8 @@ fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
     Ok(())
 }
 
-/// Whether the module of CREATE VIRTUAL TABLE name USING module(…) is a plain one. A name that has "using" in
-/// it finds no plain module, or the right one: every USING must be of a plain module.
+/// Returns whether the module of CREATE VIRTUAL TABLE name USING module(…) is a plain one. Every
+/// "using" must precede a plain module, so a name that contains "using" cannot hide another module.
 fn is_plain(sql: &str) -> bool {
     let sql = sql.to_lowercase();
     let modules = sql.split("using").skip(1).map(|rest| {

@@ -1,4 +1,4 @@
-//! Keys and records.
+//! Files of keys and records.
 
 use crate::{Error, Result};
 use meshmark_core::{
@@ -22,7 +22,7 @@ pub fn record(path: &Path) -> Result<Record> {
     })
 }
 
-/// Why a file is no record.
+/// The reason why a file is not a record.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BadRecord {
     #[error("it cannot be read: {0}")]
@@ -31,7 +31,7 @@ pub(crate) enum BadRecord {
     Malformed(meshmark_core::Error),
 }
 
-/// Reads a record of many, whose name the caller knows.
+/// Reads a record of many; the caller adds its name to errors.
 pub(crate) fn parsed_record(path: &Path) -> std::result::Result<Record, BadRecord> {
     Record::from_json(&text(path).map_err(BadRecord::Unread)?).map_err(BadRecord::Malformed)
 }

@@ -1,40 +1,40 @@
-//! The records that were tried, as the report has them.
+//! The records that were tried, as part of the report.
 
 use crate::words::{power_of_ten, printable};
 use meshmark_core::counted;
 use serde::Serialize;
 
-/// The records that were tried, as the report has them.
+/// The records that were tried, as part of the report.
 #[derive(Debug, Clone, Serialize)]
 pub struct Candidates {
-    /// How many; every p-value of the list is multiplied by it.
+    /// Number of tried records; every p-value of the list is multiplied by it.
     pub tried: usize,
-    /// How many files were no record of this key and reference.
+    /// Number of files that are not records of this key and reference.
     pub skipped: usize,
-    /// The best, the most significant first.
+    /// The best records, the most significant first.
     pub list: Vec<Entry>,
-    /// How many of them match.
+    /// Number of records that match.
     #[serde(skip)]
     pub(crate) matches: usize,
 }
 
-/// One of them.
+/// A record that was tried.
 #[derive(Debug, Clone, Serialize)]
 pub struct Entry {
-    /// Name of its file.
+    /// Name of the file.
     pub record: String,
-    /// Its recipient; null when the message was given as bits.
+    /// Recipient; null when the message was given as bits.
     pub recipient: Option<String>,
-    /// Its message, hexadecimal.
+    /// Message, hexadecimal.
     pub message: String,
-    /// log₁₀ p, times the number of candidates; null when nothing was decoded.
+    /// log₁₀ of the p-value times the number of candidates; null when nothing was decoded.
     pub p_value_log10: Option<f64>,
-    /// How many decoded bits differ from its message; null when nothing was decoded.
+    /// Number of decoded bits that differ from the message; null when nothing was decoded.
     pub bit_errors: Option<usize>,
 }
 
 impl Candidates {
-    /// For a person.
+    /// Returns lines of text.
     pub(crate) fn to_lines(&self) -> Vec<String> {
         let skipped = match self.skipped {
             0 => String::new(),

@@ -1,21 +1,22 @@
-//! What a report file holds beyond the answer.
+//! The parts of a report file beyond the answer.
 
 use super::sketch::Sketch;
 use crate::{inputs::digests::Inputs, words::printable};
 use serde::Serialize;
 
-/// Where on the map the evidence is.
+/// The places of the evidence on the map.
 #[derive(Debug, Clone, Serialize)]
 pub struct Evidence {
-    /// The map, thinned.
+    /// The thinned map.
     #[serde(flatten)]
     pub sketch: Sketch,
-    /// Of every patch, how many standard deviations its evidence for the message is above that of a random key; null
-    /// where nothing was observed. Empty when nothing was decoded or no message was expected.
+    /// For every patch, the number of standard deviations by which its evidence for the message
+    /// exceeds that of a random key; null where no displacement was observed. Empty when nothing
+    /// was decoded or no message was expected.
     pub patch_scores: Vec<Option<f64>>,
 }
 
-/// What was compared, and how to do it again.
+/// The compared data, and the means to repeat the verification.
 #[derive(Debug, Clone, Serialize)]
 pub struct Provenance {
     /// The files.
@@ -23,25 +24,26 @@ pub struct Provenance {
     pub inputs: Inputs,
     /// Digest of the vertices of the reference.
     pub reference_vertices_sha256: String,
-    /// CRS of the suspect's layers.
+    /// CRS of the layers of the suspect.
     pub suspect_crs: Vec<String>,
     /// The command line.
     pub command: String,
-    /// Programs and libraries that the result rests on, with their versions.
+    /// Programs and libraries that the result depends on, with their versions.
     pub versions: Vec<String>,
 }
 
-/// This program, and the library that reads the maps.
+/// Returns the versions of this program and of GDAL, which reads the maps.
 pub fn versions() -> Vec<String> {
     let gdal = gdal::version::VersionInfo::release_name();
     vec![format!("meshmark {}", env!("CARGO_PKG_VERSION")), format!("GDAL {gdal}")]
 }
 
-/// A command line without what only says where its output goes, and the report as `report.html`.
+/// Returns a command line without options that only name outputs, and with the report as
+/// `report.html`.
 pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
     let mut words = vec!["meshmark".to_string()];
     let mut arguments = arguments.skip(1);
-    let mut files = Vec::new(); // after "--" nothing is an option
+    let mut files = Vec::new(); // after "--" no word is an option
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--" => {
@@ -58,7 +60,8 @@ pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
     words.join(" ")
 }
 
-/// For a shell; what would turn the order of what is read is written as bash, zsh and ksh read it.
+/// Quotes a word for a shell. Characters that change the text direction are escaped for bash, zsh
+/// and ksh.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
     if printable(word) != word {

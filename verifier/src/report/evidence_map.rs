@@ -1,4 +1,5 @@
-//! What a verdict rests on, as a map: where the vertices were found, and what each patch says.
+//! The evidence for a verdict as a map: the places of matched vertices, and the score of each
+//! patch.
 
 use super::sketch::Scene;
 use crate::{Error, Result};
@@ -14,48 +15,50 @@ use std::{
 };
 use tempfile::{TempDir, TempPath};
 
-/// Equal evidence makes equal bytes: a GeoPackage holds the time of its last change.
+/// A fixed time of the last change in the GeoPackage, so that equal evidence gives equal bytes.
 const NO_TIME: &str = "1970-01-01T00:00:00.000Z";
 
-/// A reference vertex that was found.
+/// A matched vertex of the reference.
 #[derive(Debug, Clone, Copy)]
 pub struct FoundVertex {
-    /// Where it is in the reference, CRS units.
+    /// Its place in the reference, CRS units.
     pub at: [f64; 2],
-    /// The patch it is in.
+    /// The number of its patch.
     pub patch: usize,
-    /// Where it was found, CRS units.
+    /// Its place in the suspect after registration, CRS units.
     pub to: [f64; 2],
-    /// From there to there, metres on the ground.
+    /// The displacement between the two, metres on the ground.
     pub moved_m: [f64; 2],
-    /// 1, or less where the displacement does not fit in with the others.
+    /// The weight: 1, or less where the displacement disagrees with the others.
     pub weight: f64,
 }
 
-/// What one patch says.
+/// The evidence of one patch.
 #[derive(Debug, Clone)]
 pub struct PatchEvidence {
-    /// The reference's vertices in it, CRS units.
+    /// The vertices of the reference in the patch, CRS units.
     pub vertices: Vec<[f64; 2]>,
-    /// How many of them were found.
+    /// Number of matched vertices.
     pub found: usize,
-    /// Standard deviations above that of a random key; `None` where nothing was found or no message is expected.
+    /// The score in standard deviations of a random key; `None` where no vertex matches or no
+    /// message is expected.
     pub score: Option<f64>,
 }
 
-/// Where the vertices were found, and what each patch says.
+/// The places of matched vertices, and the evidence of each patch.
 #[derive(Debug, Clone)]
 pub struct EvidenceMap {
     /// CRS of the reference.
     pub crs: Option<CoordinateSystem>,
-    /// In canonical order.
+    /// Matched vertices in canonical order.
     pub vertices: Vec<FoundVertex>,
-    /// All patches, whether anything of them was found or not.
+    /// All patches, with or without matched vertices.
     pub patches: Vec<PatchEvidence>,
 }
 
 impl EvidenceMap {
-    /// Of what was demodulated: without that, the patches alone. `crs` is that of the reference.
+    /// Creates the map from a demodulated scene; without demodulation it has patches alone. `crs`
+    /// is that of the reference.
     pub fn new(scene: &Scene, crs: Option<&CoordinateSystem>) -> Self {
         let reference = scene.matched.reference;
         let (coords, ground) = (reference.data.vertices.coords(), &reference.ground);
@@ -83,16 +86,18 @@ impl EvidenceMap {
         map
     }
 
-    /// The same with the score of every patch for the message that is expected; without scores, as it is.
+    /// Adds the score of every patch for the expected message; without scores the map stays
+    /// unchanged.
     pub fn scored(mut self, scores: Vec<Option<f64>>) -> Self {
         self.patches.iter_mut().zip(scores).for_each(|(patch, score)| patch.score = score);
         self
     }
 
-    /// Writes a GeoPackage with the layers `vertex_displacements`, a line for every matched vertex, and `patches`.
+    /// Writes a GeoPackage with the layers `vertex_displacements`, a line for every matched vertex,
+    /// and `patches`.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// Fails when the file cannot be written.
     pub fn write(&self, target: &EvidenceMapFile) -> Result<()> {
         let failed = |reason: String| target.failed(&reason);
         let workplace = workplace(&target.path)?;
@@ -151,7 +156,8 @@ impl EvidenceMap {
         })
     }
 
-    /// One layer in one transaction; `fill` sets a row's fields and gives its geometry.
+    /// Writes one layer in one transaction; `fill` sets the fields of a row and returns its
+    /// geometry.
     fn write_layer<Row>(
         &self,
         dataset: &mut Dataset,
@@ -184,15 +190,17 @@ fn points(places: &[[f64; 2]]) -> gdal::errors::Result<Geometry> {
     Ok(geometry)
 }
 
-/// A file that does not exist yet. Making one checks, before a long verification, that the file can be written, and leaves
-/// nothing there meanwhile: a verification may be stopped.
+/// A file that does not exist yet. Its creation checks, before a long verification, that the file
+/// is writable, and leaves no file behind, as a verification may be stopped.
 pub struct EvidenceMapFile {
     path: PathBuf,
 }
 
 impl EvidenceMapFile {
+    /// Checks that the file can be written.
+    ///
     /// # Errors
-    /// The file exists, or its folder cannot be written to.
+    /// Fails when the file exists, and when its folder is not writable.
     pub fn new(path: &Path) -> Result<Self> {
         let folder = folder_of(path);
         if !folder.is_dir() {
@@ -212,7 +220,7 @@ impl EvidenceMapFile {
     }
 }
 
-/// A private folder beside the file, to make it in.
+/// Creates a private folder beside the file, for its construction.
 fn workplace(path: &Path) -> Result<TempDir> {
     let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder_of(path));
     workplace.map_err(|error| unwritable(path, &error.to_string()))

@@ -1,4 +1,4 @@
-//! What `--explain` prints: the report in sentences, for one who must rely on it.
+//! The output of `--explain`: the report in sentences, for readers who depend on it.
 
 use super::Report;
 use crate::{
@@ -9,7 +9,7 @@ use meshmark_core::counted;
 use meshmark_detection::decision::{Null, Verdict};
 use std::fmt::Write as _;
 
-/// The report in sentences.
+/// Returns the report in sentences.
 pub fn explain(inputs: &Inputs, report: &Report) -> String {
     let sections = [
         ("What was compared", compared(inputs, report)),
@@ -56,7 +56,7 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
     sentences
 }
 
-/// What was deposited, or must have been.
+/// Returns sentences about the deposit of key and reference.
 pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
     let mut sentences = vec![
         "Whoever has the key and the reference can mark a map for any recipient, also afterwards, and can try \
@@ -104,7 +104,7 @@ fn found(report: &Report) -> Vec<String> {
     sentences
 }
 
-/// What was assumed to bring the suspect onto the reference, beyond an affine map.
+/// Returns sentences about the assumptions of the registration beyond an affine map.
 pub(crate) fn assumed(report: &Report) -> Vec<String> {
     let registration = &report.registration;
     let read_as = registration.read_as.as_ref().map(|read_as| {
@@ -176,10 +176,10 @@ pub(crate) fn probabilities(report: &Report) -> Vec<String> {
     sentences
 }
 
-/// What the message says of a person.
+/// Returns a sentence about the person that the message identifies.
 pub(crate) fn bound(report: &Report) -> Vec<String> {
     if report.candidates.is_some() && report.verdict != Verdict::Match {
-        return Vec::new(); // of many copies none
+        return Vec::new(); // no copy of many is identified
     }
     let p = &report.parameters;
     let sentence = match (&p.recipient, &p.expected_message) {

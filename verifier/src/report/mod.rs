@@ -1,4 +1,4 @@
-//! The report: data and words. What it says was computed when the suspect was examined.
+//! The report: data and words. The examination of the suspect computes the data.
 
 mod candidates;
 mod evidence;
@@ -33,9 +33,10 @@ pub struct Report {
     pub meshmark_report: u32,
     /// The answer.
     pub verdict: Verdict,
-    /// One sentence why.
+    /// The reason, one sentence.
     pub reason: String,
-    /// The message as decoded, hexadecimal, in the terms of the expected one; null when nothing was decoded.
+    /// The decoded message, hexadecimal, in the form of the expected one; null when nothing was
+    /// decoded.
     pub message: Option<String>,
     /// The decoded bits themselves, hexadecimal.
     pub carried_message: Option<String>,
@@ -43,37 +44,37 @@ pub struct Report {
     pub unwhitened_message: Option<String>,
     /// Log-likelihood ratios of these bits after decoding, natural logarithm, positive = 1.
     pub bits: Vec<f64>,
-    /// How many of these bits differ from those of the expected message.
+    /// Number of these bits that differ from those of the expected message.
     pub bit_errors: Option<usize>,
-    /// How the message was decoded.
+    /// The decoding of the message.
     pub code: CodeEntry,
-    /// The larger of the next two, times the number of candidates.
+    /// log₁₀ of the larger of the next two p-values, times the number of candidates.
     pub p_value_log10: Option<f64>,
-    /// log₁₀ p of this much evidence under a random key.
+    /// log₁₀ of the p-value of this much evidence under a random key.
     pub p_mark_log10: Option<f64>,
-    /// log₁₀ p of this much agreement under `null_hypothesis`.
+    /// log₁₀ of the p-value of this much agreement under `null_hypothesis`.
     pub p_recipient_log10: Option<f64>,
-    /// What the copy of somebody else carries; null when no message was expected.
+    /// The content of a copy with another message; null when no message was expected.
     pub null_hypothesis: Option<Null>,
-    /// log₁₀ p of this much evidence for any message at all under a random key.
+    /// log₁₀ of the p-value of this much evidence for any message under a random key.
     pub p_any_message_log10: Option<f64>,
-    /// The records that were tried; null when one mark was asked for.
+    /// The records that were tried; null when the request names one mark.
     pub candidates: Option<Candidates>,
-    /// How decoy keys score; null when nothing was decoded or nothing moved.
+    /// Scores of decoy keys; null when nothing was decoded or no vertex moved.
     pub decoys: Option<Decoys>,
-    /// How the suspect was brought onto the reference.
+    /// The registration of the suspect.
     pub registration: Registration,
-    /// Vertices of the two maps.
+    /// Numbers of vertices of the two maps.
     pub vertices: VertexCounts,
-    /// What was assumed of the mark and how it was tested.
+    /// The assumed parameters of the mark, and those of the test.
     pub parameters: ReportParameters,
     /// Seconds by stage; null in a report file, which is the same for the same input.
     pub seconds: Option<BTreeMap<&'static str, f64>>,
-    /// What was compared and how to do it again; null but in a report file.
+    /// The compared data and the means to repeat the verification; null except in a report file.
     pub provenance: Option<Provenance>,
-    /// Where on the map the evidence is; null but in a report file.
+    /// The places of the evidence on the map; null except in a report file.
     pub evidence: Option<Evidence>,
-    /// How many messages were tried.
+    /// Number of messages that were tried.
     #[serde(skip)]
     pub tried: usize,
     /// The expected message as the code carries it, hexadecimal.
@@ -82,39 +83,40 @@ pub struct Report {
     /// Digest of the vertices of the reference.
     #[serde(skip)]
     pub reference_digest: String,
-    /// CRS of the suspect's layers.
+    /// CRS of the layers of the suspect.
     #[serde(skip)]
     pub suspect_crs: Vec<String>,
-    /// Where the vertices were found, and what each patch says.
+    /// The places of matched vertices, and the evidence of each patch.
     #[serde(skip)]
     pub evidence_map: Option<EvidenceMap>,
 }
 
-/// How the message was decoded.
+/// The decoding of the message.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct CodeEntry {
     /// The code.
     pub name: Code,
-    /// How many channel bits differ from those of the expected message, before decoding.
+    /// Number of channel bits that differ from those of the expected message, before decoding.
     pub channel_bit_errors: Option<usize>,
-    /// Whether belief propagation came to a word that passes all parity checks; null without a code that has any.
+    /// Whether belief propagation reached a word that passes all parity checks; null for a code
+    /// without checks.
     pub parity_holds: Option<bool>,
-    /// What found the message; null when nothing was decoded.
+    /// The decoder that found the message; null when nothing was decoded.
     pub decoder: Option<Decoder>,
 }
 
-/// Distinct vertices.
+/// Numbers of distinct vertices.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct VertexCounts {
-    /// Of the reference.
+    /// Vertices of the reference.
     pub reference: usize,
-    /// Of the suspect.
+    /// Vertices of the suspect.
     pub suspect: usize,
-    /// Of the reference that have a counterpart within the radius.
+    /// Vertices of the reference with a match within the radius.
     pub matched: usize,
 }
 
-/// What was assumed of the mark and how it was tested.
+/// The assumed parameters of the mark, and those of the test.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the names are those of the options
 pub struct ReportParameters {
@@ -139,12 +141,12 @@ pub struct ReportParameters {
 }
 
 impl Report {
-    /// One JSON object, with a line feed at its end.
+    /// Returns one JSON object, followed by a line feed.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and strings are JSON") + "\n"
     }
 
-    /// The exit code of this verdict.
+    /// Returns the exit code of this verdict.
     pub fn exit_code(&self) -> ExitCode {
         match self.verdict {
             Verdict::Match => ExitCode::Match,

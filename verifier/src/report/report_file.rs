@@ -1,4 +1,5 @@
-//! A report as a file: HTML to read or JSON to process, written whole or not at all, and never over another.
+//! A report as a file: HTML for readers or JSON for programs. It is written completely or not at
+//! all, and never replaces another file.
 
 use crate::{Error, Result};
 use meshmark_dataset::workplace::folder_of;
@@ -8,26 +9,27 @@ use std::{
 };
 use tempfile::NamedTempFile;
 
-/// Where a report goes.
+/// The file of a report.
 pub struct ReportFile {
     path: PathBuf,
     format: Format,
 }
 
-/// What it is.
+/// The format of a report file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// For people.
+    /// HTML, for readers.
     Html,
-    /// For programs.
+    /// JSON, for programs.
     Json,
 }
 
 impl ReportFile {
-    /// Checks, before anything is compared, that the file could be written.
+    /// Checks, before the comparison starts, that the file can be written.
     ///
     /// # Errors
-    /// Another extension than html and json, a file that exists, a folder that does not or that may not be written to.
+    /// Fails on another extension than html and json, on a file that exists, and on a folder that is
+    /// missing or not writable.
     pub fn new(path: &Path) -> Result<Self> {
         let refused = |reason: &str| Err(Error::ReportName { path: path.into(), reason: reason.into() });
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -44,24 +46,24 @@ impl ReportFile {
             return refused(&format!("cannot be written: {folder} is no folder, make it first"));
         }
         let file = ReportFile { path: path.into(), format };
-        file.temporary()?; // may the folder be written to?
+        file.temporary()?; // checks that the folder is writable
         Ok(file)
     }
 
-    /// What it is.
+    /// Returns the format.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Where it is.
+    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes it.
+    /// Writes the report.
     ///
     /// # Errors
-    /// The disk, the permissions of the folder, or a file that came into being meanwhile.
+    /// Fails when the disk or the folder does not accept the file, and when the file exists by now.
     pub fn write(&self, text: &str) -> Result<()> {
         let failed = |error| self.failed(error);
         let mut file = self.temporary()?;
@@ -74,7 +76,7 @@ impl ReportFile {
     fn temporary(&self) -> Result<NamedTempFile> {
         let mut options = tempfile::Builder::new();
         options.prefix(".meshmark-report-");
-        #[cfg(unix)] // less the process's umask, as for any file
+        #[cfg(unix)] // the umask of the process applies, as for any file
         options.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         options.tempfile_in(folder_of(&self.path)).map_err(|error| self.failed(without_path(error)))
     }
@@ -91,7 +93,7 @@ impl ReportFile {
     }
 }
 
-/// The name of the temporary file helps nobody.
+/// Removes the path of the temporary file from an error, as it does not help the reader.
 fn without_path(error: std::io::Error) -> std::io::Error {
     error.kind().into()
 }

@@ -1,4 +1,4 @@
-//! The report as a short answer for a person.
+//! The report as a short text.
 
 use super::Report;
 use crate::words::power_of_ten;
@@ -6,7 +6,7 @@ use meshmark_core::code::Decoder;
 use meshmark_detection::decision::Verdict;
 
 impl Report {
-    /// A short answer for a person.
+    /// Returns a short text.
     pub fn to_text(&self) -> String {
         let mut lines = vec![format!("verdict:      {}: {}", self.verdict_name(), self.reason)];
         if let Some(candidates) = &self.candidates {
@@ -17,7 +17,7 @@ impl Report {
                 format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
             });
             lines.push(format!("message:      {message}{}{errors}", self.other_reading()));
-            // Of noise, too, a code word and bits are made; their odds suppose a mark.
+            // Noise also decodes to a code word and bits, whose odds are valid only for a mark.
             lines.extend(self.decoding().map(|how| format!("code:         {how}")));
             lines.push(match self.shows_mark() {
                 true => format!("bits:         {}", certainty(&self.bits)),
@@ -57,13 +57,13 @@ impl Report {
         lines
     }
 
-    /// What the message is where nothing says whether the key whitened it.
+    /// Returns the other reading of the message, where it is unknown whether the key whitened it.
     pub(crate) fn other_reading(&self) -> String {
         let other = self.unwhitened_message.as_ref().filter(|_| self.parameters.expected_message.is_none());
         other.map_or(String::new(), |other| format!(", or {other} if the copy was marked with MESSAGE"))
     }
 
-    /// What LDPC did with the mark that shows, for a person.
+    /// Describes the LDPC decoding of a visible mark.
     pub(crate) fn decoding(&self) -> Option<String> {
         let how = match self.code.decoder.filter(|_| self.shows_mark())? {
             Decoder::Sign => return None,
@@ -76,12 +76,12 @@ impl Report {
         Some(format!("{}read by {how}", wrong.unwrap_or_default()))
     }
 
-    /// Whether what was decoded is a mark rather than noise.
+    /// Returns whether the decoded bits come from a mark rather than from noise.
     pub(crate) fn shows_mark(&self) -> bool {
         self.verdict == Verdict::Match || self.shows_key()
     }
 
-    /// Whether some mark of the key is there, whatever its message.
+    /// Returns whether the suspect carries some mark of the key, whatever its message.
     pub(crate) fn shows_key(&self) -> bool {
         self.p_any_message_log10.is_some_and(|p| p < self.parameters.significance.log10())
     }
@@ -95,7 +95,7 @@ impl Report {
     }
 }
 
-/// How sure the bits are, from their log-likelihood ratios.
+/// Describes the certainty of the bits, given their log-likelihood ratios.
 pub(crate) fn certainty(bits: &[f64]) -> String {
     let mut sure: Vec<f64> = bits.iter().map(|llr| llr.abs()).collect();
     sure.sort_by(f64::total_cmp);
@@ -104,7 +104,7 @@ pub(crate) fn certainty(bits: &[f64]) -> String {
     format!("weakest right with odds {weakest}, median {median}; {beyond} of {} over 1000 to 1", bits.len())
 }
 
-/// "1000 to 1", from a log-likelihood ratio.
+/// Formats a log-likelihood ratio as odds, for example "1000 to 1".
 fn odds(llr: f64) -> String {
     if llr > 13.8 { "over a million to 1".into() } else { format!("{:.1} to 1", llr.exp()) }
 }

@@ -1,14 +1,14 @@
-//! Whether a record belongs to a key and a reference.
+//! Checks that a record belongs to a key and a reference.
 
 use super::request::Request;
 use crate::{Error, Result};
 use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_dataset::Survey;
 
-/// The record must be of this key, and its message what key and recipient give.
+/// Checks that the record is of this key, and that its message follows from key and recipient.
 ///
 /// # Errors
-/// It is of another key, or was changed.
+/// Fails when the record is of another key, or was changed.
 pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
     if record.key_id != key.id() {
         return Err(Error::OtherKey { made_with: record.key_id.clone(), given: key.id() });
@@ -19,10 +19,11 @@ pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
     Ok(())
 }
 
-/// The record must be of this very reference, whose vertices have this digest: the mesh of any other differs.
+/// Checks that the record is of this reference, whose vertices have this digest: any other has
+/// another mesh.
 ///
 /// # Errors
-/// It is of another one.
+/// Fails when the record is of another reference.
 pub fn check_reference(record: &Record, request: &Request, reference: &Survey, digest: &str) -> Result<()> {
     if record.reference.vertices_sha256 == digest {
         return Ok(());

@@ -1,4 +1,4 @@
-//! From what was found and decided to the report: all that needs the secret key.
+//! The conclusion: a report on examination and decision, including all that needs the secret key.
 
 use super::{examination::Examination, request::Request};
 use crate::report::{CodeEntry, Evidence, Report, ReportParameters};
@@ -9,7 +9,7 @@ use meshmark_detection::{
 };
 use std::collections::BTreeMap;
 
-/// The report on what was found and decided.
+/// Creates the report on an examination and the decision.
 pub fn conclude(
     request: &Request,
     seen: &Examination,

@@ -1,7 +1,8 @@
-//! Which CRS are the suspect's numbers in? Its own, unless they make no sense there.
+//! The search for the CRS of the suspect's coordinates: its own, unless they are implausible in it.
 //!
-//! Every likely CRS is a candidate start of the registration, with x and y exchanged or not, and the one under
-//! which most vertices match wins. No key is involved, so trying many costs no significance.
+//! Every likely CRS is a candidate start of the registration, with x and y exchanged or not, and
+//! the one with most matched vertices wins. No key is involved, so many attempts do not reduce the
+//! significance.
 
 use crate::{
     Result,
@@ -15,18 +16,19 @@ use meshmark_dataset::{Assumption, Survey, likely_assumptions, overlaps};
 use meshmark_detection::registration::{ReadAs, Registrar, Registration, Start};
 use std::path::Path;
 
-/// A suspect in the coordinates it was registered from.
+/// A suspect and its registration.
 pub struct Registered {
-    /// In the CRS of the reference.
+    /// The map in the CRS of the reference.
     pub map: Survey,
-    /// From there to the reference.
+    /// The registration of that map.
     pub registration: Registration,
 }
 
-/// Registers a suspect under its own CRS, and under others when it has none or is not where the reference is.
+/// Registers a suspect under its own CRS, and under others when it has none or does not coincide
+/// with the reference.
 ///
 /// # Errors
-/// The suspect cannot be read a second time.
+/// Fails when the suspect cannot be read a second time.
 pub fn register(
     registrar: &Registrar,
     reference: &Survey,
@@ -38,11 +40,12 @@ pub fn register(
     let doubtful = is_raw || !overlaps(&map, reference);
     let at_first = match start {
         Start::None => registrar.as_it_stands(&map.data),
-        // What a wrong CRS does to a map is not quite affine: the right one comes before other starts.
+        // A wrong CRS distorts a map in a way that is not quite affine, so the right one is tried
+        // before other starts.
         Start::Auto if doubtful => registrar.refine_in_place(&map.data),
         _ => registrar.register(&map.data, start),
     };
-    // Where the numbers were not reprojected they are taken to be in the reference's CRS.
+    // Coordinates that were not reprojected are assumed to be in the CRS of the reference.
     let has_numbers = is_raw && !map.data.vertices.is_empty();
     let own =
         reference.crs.clone().filter(|_| has_numbers).map(|crs| Assumption { crs, axes_swapped: false });
@@ -59,13 +62,13 @@ pub fn register(
     }
     let plain = match doubtful && start == Start::Auto {
         true => plain.search_all(registrar, start),
-        false => plain, // it was searched before
+        false => plain, // this start was searched before
     };
     let Some(assumed) = assumed.filter(|_| !plain.registration.agrees_in_part()) else { return Ok(plain) };
     Ok(plain.or_better(assumed.search_all(registrar, start)))
 }
 
-/// The assumption under which most vertices match where they are.
+/// Returns the assumption with most matched vertices in place.
 fn in_place(
     registrar: &Registrar,
     reference: &Survey,
@@ -103,7 +106,7 @@ impl Registered {
         self.registration.agrees()
     }
 
-    /// The same map from all starts.
+    /// Registers the same map from all starts.
     fn search_all(self, registrar: &Registrar, start: Start) -> Self {
         let read_as = self.registration.read_as;
         let registration = registrar.register(&self.map.data, start);

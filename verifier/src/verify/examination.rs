@@ -1,4 +1,4 @@
-//! The examination of a suspect: registered, matched, demodulated. No message is involved.
+//! The examination of a suspect: registration, matching, demodulation. No message is involved.
 
 use super::{
     crs_search::{self, Registered},
@@ -25,32 +25,32 @@ use meshmark_detection::{
     registration::{Registrar, Registration, Start},
 };
 
-/// What a suspect shows before it is compared with any message.
+/// The evidence of a suspect before the comparison with a message.
 pub struct Examination {
-    /// How the suspect was brought onto the reference.
+    /// The registration of the suspect.
     pub registration: Registration,
-    /// Vertices of the two maps.
+    /// Numbers of vertices of the two maps.
     pub vertices: VertexCounts,
     /// Digest of the vertices of the reference.
     pub reference_digest: String,
     /// CRS of the reference.
     pub crs: Option<String>,
-    /// CRS of the suspect's layers.
+    /// CRS of the layers of the suspect.
     pub suspect_crs: Vec<String>,
-    /// What was demodulated, or why nothing was.
+    /// The demodulated evidence, or the reason why there is none.
     pub found: std::result::Result<Demodulation, String>,
-    /// How decoy keys score.
+    /// Scores of decoy keys.
     pub decoys: Option<Decoys>,
-    /// What a report file draws, when that was asked for.
+    /// The drawing data of a report file, if requested.
     pub sketch: Option<Sketch>,
-    /// What a GIS draws, when that was asked for.
+    /// The evidence map, if requested.
     pub evidence_map: Option<EvidenceMap>,
 }
 
 /// Reads the reference of a request.
 ///
 /// # Errors
-/// It cannot be read.
+/// Fails when it cannot be read.
 pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Fit<Survey>> {
     progress.start("reading", 0);
     let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
@@ -62,19 +62,19 @@ pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Fit<
     }
 }
 
-/// What a reference is to a request.
+/// The fit of a reference to a request.
 pub enum Fit<T> {
-    /// The mark of the request may be in a map made from it.
+    /// A map made from the reference may carry the mark of the request.
     Fits(T),
-    /// The mark cannot have been made from it, and why.
+    /// The reference does not allow the mark; the error holds the reason.
     Unfit(Error),
 }
 
 impl<T> Fit<T> {
-    /// For a request that names this very reference.
+    /// Returns the value, for a request that names this very reference.
     ///
     /// # Errors
-    /// It does not fit.
+    /// Fails when the reference does not fit.
     pub fn or_fail(self) -> Result<T> {
         match self {
             Fit::Fits(found) => Ok(found),
@@ -86,7 +86,7 @@ impl<T> Fit<T> {
 /// Registers, matches and demodulates the suspect of a request.
 ///
 /// # Errors
-/// An unreadable suspect.
+/// Fails when the suspect is unreadable.
 pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Fit<Examination>> {
     let unfit =
         |source| Fit::Unfit(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
@@ -99,7 +99,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     progress.start("patches", 0);
     let compared = match Reference::new(&reference.data, &map, request.bits, &request.parameters) {
         Ok(compared) => compared,
-        Err(error) => return Ok(unfit(error.into())), // before the map is searched for
+        Err(error) => return Ok(unfit(error.into())), // this comes before the search for the map
     };
     let Registered { map: suspect, registration } =
         register(request, (reference, &compared), suspect, progress)?;

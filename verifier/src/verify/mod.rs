@@ -1,11 +1,11 @@
-//! Verification from files to a report.
+//! Verification, from files to a report.
 //!
 //! ```text
 //! request ─► examination ─► decision ─► conclusion ─► report
 //!             crs_search, detection
 //! ```
 //!
-//! [`verify()`] asks for one mark, [`verify_records`] for that of every record of a folder.
+//! [`verify()`] tests one mark, [`verify_records`] the mark of every record of a folder.
 
 mod belonging;
 mod conclusion;
@@ -27,7 +27,8 @@ use meshmark_detection::decision::{Decision, Expected, decide_among};
 /// Verifies one suspect.
 ///
 /// # Errors
-/// Unreadable input, parameters that do not fit the reference, a record of another reference.
+/// Fails on unreadable input, on parameters that do not fit the reference, and on a record of another
+/// reference.
 pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
     let reference = read_reference(request, progress)?.or_fail()?;
     if let Some(record) = &request.record {
@@ -42,7 +43,7 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
     Ok(conclude(&request, &seen, decision, progress.finish()))
 }
 
-/// The best of what the mark may say, and the decision on it.
+/// Decides on every subject that the mark may have; returns the best one and its decision.
 fn decide_subjects(request: &Request, found: &Demodulation) -> (Option<Subject>, Decision) {
     let subjects = request.subjects();
     let tried = subjects.len();

@@ -1,6 +1,6 @@
-//! Many records, one suspect: which recipient's copy is it?
+//! Verification against many records: finds the recipient of a copy.
 //!
-//! Records that were made with the same settings expect the same mark but for its message: the suspect is
+//! Records with equal settings expect marks that differ only in the message, so the suspect is
 //! registered, matched and demodulated once for all of them.
 
 use super::{
@@ -21,7 +21,7 @@ use meshmark_core::{
 use meshmark_detection::decision::{Decision, Expected, Verdict, decide_among};
 use std::path::Path;
 
-/// So many of the best are listed, and every match.
+/// Number of the best records in the list, which also holds every match.
 const MOST_LISTED: usize = 20;
 
 /// A record of the folder.
@@ -29,17 +29,17 @@ struct Candidate {
     file: String,
     record: Record,
     subject: Subject,
-    /// As the record has it.
+    /// The message in the record.
     message: Message,
 }
 
-/// Candidates with the same settings.
+/// Candidates with equal settings.
 struct Group {
     request: Request,
     candidates: Vec<Candidate>,
 }
 
-/// What came of one candidate.
+/// The outcome of one candidate.
 struct Outcome {
     group: usize,
     candidate: Candidate,
@@ -47,11 +47,12 @@ struct Outcome {
     bit_errors: Option<usize>,
 }
 
-/// Verifies one suspect against every record (*.json) of a folder. `request` says how; what it says of the mark
-/// is taken from the records. `warn` is told which files are skipped, and why.
+/// Verifies one suspect against every record (*.json) of a folder. `request` holds the other
+/// settings; its mark is replaced by that of each record. `warn` receives the skipped files with
+/// the reasons.
 ///
 /// # Errors
-/// As [`crate::verify()`], and when no record is usable.
+/// Fails like [`crate::verify()`], and when no record is usable.
 pub fn verify_records(
     request: &Request,
     folder: &Path,
@@ -89,7 +90,7 @@ pub fn verify_records(
     Ok(Report { candidates: Some(listed(&outcomes, left_out)), ..report })
 }
 
-/// "a.json is", "a.json, b.json and 31 more are".
+/// Names files with a verb: "a.json is", "a.json, b.json and 31 more are".
 fn these_are(files: &[String]) -> String {
     match files {
         [file] => format!("{file} is"),
@@ -99,7 +100,7 @@ fn these_are(files: &[String]) -> String {
     }
 }
 
-/// Reads what can be read, in the order of file names.
+/// Reads all readable records, in the order of file names.
 fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) -> Result<Vec<Candidate>> {
     let unreadable = |error: std::io::Error| Error::FolderUnread { path: folder.into(), source: error };
     let mut files = Vec::new();
@@ -124,14 +125,14 @@ fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) 
     Ok(candidates)
 }
 
-/// The candidate of a record that belongs to the key.
+/// Creates the candidate of a record that belongs to the key.
 fn candidate(file: String, record: Record, key: &SecretKey) -> Result<Candidate> {
     check_key(&record, key)?;
     let (subject, message) = (record.subject()?, record.message()?);
     Ok(Candidate { file, record, subject, message })
 }
 
-/// Puts records together that differ in their message alone.
+/// Groups records that differ only in their message.
 fn groups(request: &Request, candidates: Vec<Candidate>) -> Result<Vec<Group>> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
@@ -152,7 +153,8 @@ fn groups(request: &Request, candidates: Vec<Candidate>) -> Result<Vec<Group>> {
     Ok(groups)
 }
 
-/// Demodulates the suspect for one group; `None` when no record of it is of this reference.
+/// Demodulates the suspect for one group; returns `None` when none of its records is of this
+/// reference.
 fn examine_group(
     mut group: Group,
     progress: &mut Progress,
@@ -179,13 +181,13 @@ fn examine_group(
     }
 }
 
-/// What does not fit the reference is wrong in the records.
+/// Skips a whole group, as settings that do not fit the reference are a fault of the records.
 fn skip_all<T>(group: &Group, error: &Error, skip: &mut dyn FnMut(&str, String)) -> Option<T> {
     group.candidates.iter().for_each(|candidate| skip(&candidate.file, error.to_string()));
     None
 }
 
-/// Decides on every candidate; the best comes first.
+/// Decides on every candidate; the best one comes first.
 fn decide_all(
     of_group: Vec<Vec<Candidate>>,
     examined: &[(Request, Examination)],
@@ -225,7 +227,7 @@ fn decide_all(
     outcomes
 }
 
-/// The answer to all of them: the grounds are those of the best.
+/// Returns the decision on all candidates, with the grounds of the best one.
 fn overall(outcomes: &[Outcome]) -> Decision {
     let best = outcomes[0].decision.clone();
     let matches = count_matches(outcomes);

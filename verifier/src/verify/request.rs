@@ -1,4 +1,4 @@
-//! What to verify, and against what.
+//! The request of a verification.
 
 use meshmark_core::{
     key::SecretKey,
@@ -9,60 +9,62 @@ use meshmark_dataset::LabelFields;
 use meshmark_detection::{Demodulator, Mark, decision::Expected, registration::Start};
 use std::path::PathBuf;
 
-/// What to verify, and against what.
+/// The inputs and settings of a verification.
 #[derive(Clone)]
 pub struct Request {
     /// The secret key.
     pub key: SecretKey,
-    /// The map before it was marked.
+    /// The map before marking.
     pub reference: PathBuf,
-    /// The map in question.
+    /// The suspect map.
     pub suspect: PathBuf,
-    /// What the driver wrote when it marked.
+    /// The record that the driver wrote when it marked the map.
     pub record: Option<Record>,
-    /// What the mark should say, if it is known.
+    /// The expected subject of the mark, if it is known.
     pub subject: Option<Subject>,
-    /// Bits of the message.
+    /// Length of the message, bits.
     pub bits: usize,
-    /// The numbers that shaped the mark.
+    /// The parameters of the mark.
     pub parameters: Parameters,
     /// Layers that were marked; all when `None`.
     pub layers: Option<Vec<String>>,
     /// CRS of the reference when it has none.
     pub srs: Option<String>,
-    /// Fields of the reference to use as landmarks; all when empty. Those of the suspect may have other names.
+    /// Fields of the reference that become landmarks; all when empty. Fields of the suspect may
+    /// have other names.
     pub landmarks: Vec<String>,
-    /// Where to start the registration.
+    /// The start of the registration.
     pub registration: Start,
-    /// How to demodulate.
+    /// The demodulator.
     pub demodulator: Demodulator,
     /// Matching radius t, metres.
     pub radius_m: f64,
-    /// p-values below this are a match.
+    /// The significance: smaller p-values are a match.
     pub significance: f64,
-    /// Whether to keep what a report file draws.
+    /// Whether to keep the drawing data of a report file.
     pub sketch: bool,
-    /// Whether to keep what a GIS draws.
+    /// Whether to keep the evidence map.
     pub evidence_map: bool,
 }
 
 impl Request {
-    /// The bits that the code should carry, if they are known.
+    /// Returns the bits that the code is expected to carry, if they are known.
     pub fn expected(&self) -> Option<Expected> {
         self.subject.as_ref().map(|subject| Expected::new(subject, &self.key))
     }
 
-    /// The recipient that the message is made from.
+    /// Returns the recipient from which the message follows.
     pub fn recipient(&self) -> Option<&str> {
         self.subject.as_ref().and_then(Subject::recipient)
     }
 
-    /// What the mark is made with.
+    /// Returns the properties of the mark.
     pub(super) fn mark(&self) -> Mark<'_> {
         Mark { key: &self.key, bits: self.bits, parameters: &self.parameters }
     }
 
-    /// What the mark may say: without a record, a message may be of the time before whitening.
+    /// Returns the possible subjects of the mark. Without a record, a message may precede the
+    /// introduction of whitening.
     pub(super) fn subjects(&self) -> Vec<Subject> {
         match (&self.record, &self.subject) {
             (None, Some(Subject::Message(message))) => {

@@ -1,16 +1,16 @@
-//! Where a map is.
+//! The extent of a map.
 
 use meshmark_core::{ground::Ground, vertices::VertexTable};
 use serde::Serialize;
 
-/// The rectangle of a map.
+/// The bounding rectangle of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Extent {
     /// Lower left corner, CRS units.
     pub lower: [f64; 2],
     /// Upper right corner, CRS units.
     pub upper: [f64; 2],
-    /// Metres on the ground per CRS unit in its middle, of x and of y.
+    /// Metres on the ground per CRS unit in the middle of the rectangle, along x and y.
     pub metres_per_unit: [f64; 2],
 }
 
@@ -20,7 +20,7 @@ impl Extent {
         Extent { lower, upper, metres_per_unit: ground.metres_per_unit(vertices.centre()) }
     }
 
-    /// Width and height on the ground, metres.
+    /// Returns width and height on the ground, metres.
     pub(crate) fn size_m(&self) -> [f64; 2] {
         [0, 1].map(|axis| (self.upper[axis] - self.lower[axis]) * self.metres_per_unit[axis])
     }

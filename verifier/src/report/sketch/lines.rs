@@ -1,16 +1,18 @@
-//! The segments of a map as few and short lines: what lies on one point of a page is drawn once.
+//! The segments of a map as few and short lines, where segments that share a point of the page are
+//! drawn once.
 
 use super::extent::Extent;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Segments of a drawing; twice as many would be no clearer on a page.
+/// Largest number of segments in a drawing; more would be no clearer on a page.
 const MOST: usize = 30_000;
-/// Points along the longer side of a page, the finest that is tried first.
+/// Number of grid points along the longer side of a page in the finest grid, which is tried first.
 const FINEST: usize = 4000;
 
 type Node = [u32; 2];
 
-/// Lines along the segments, snapped to the finest grid on which they are not too many. CRS units.
+/// Returns lines along the segments, CRS units, snapped to the finest grid that keeps within the
+/// limit.
 pub(crate) fn lines(extent: &Extent, coords: &[[f64; 2]], segments: &[[u32; 2]]) -> Vec<Vec<[f64; 2]>> {
     let mut points = FINEST;
     loop {
@@ -25,7 +27,7 @@ pub(crate) fn lines(extent: &Extent, coords: &[[f64; 2]], segments: &[[u32; 2]])
 
 struct Grid {
     lower: [f64; 2],
-    /// CRS units.
+    /// Width and height of a grid cell, CRS units.
     step: [f64; 2],
 }
 
@@ -52,7 +54,7 @@ impl Grid {
     }
 }
 
-/// Walks along the segments for as long as there is one to go on with.
+/// Joins segments into lines, each as long as there is a segment that continues it.
 fn joined(segments: BTreeSet<[Node; 2]>) -> Vec<Vec<Node>> {
     let mut left: BTreeMap<Node, BTreeSet<Node>> = BTreeMap::new();
     for [a, b] in segments {

@@ -1,4 +1,5 @@
-//! What a report draws of a verification: a map that is thinned to what a page can show. No key is involved.
+//! The drawing data of a verification report: a map thinned to the resolution of a page. No key is
+//! involved.
 
 mod extent;
 mod lines;
@@ -13,89 +14,89 @@ pub use extent::Extent;
 pub(crate) use lines::lines;
 pub(crate) use thinning::Thinning;
 
-/// Bins of the displacements.
+/// Number of bins of the displacement histogram.
 pub(crate) const BINS: usize = 40;
 
 /// The two maps after registration.
 pub struct Scene<'a> {
-    /// The suspect on the reference.
+    /// The registered suspect and its reference.
     pub matched: &'a Matched<'a>,
-    /// Which vertex is which in the end.
+    /// The matches after tracking of the deformation.
     pub matches: &'a Matches,
-    /// What was demodulated, if anything was.
+    /// The demodulated evidence, if there is any.
     pub demodulated: Option<&'a Demodulated>,
 }
 
 /// The thinned map.
 #[derive(Debug, Clone, Serialize)]
 pub struct Sketch {
-    /// Where the reference is.
+    /// The extent of the reference.
     pub extent: Extent,
-    /// Its patches, by number.
+    /// The patches of the reference, by number.
     pub patches: Vec<PatchPlace>,
-    /// How far matched vertices are from where they were, metres; null when none matched.
+    /// Displacements of matched vertices, metres; null when none matched.
     pub displacement_m: Option<Histogram>,
-    /// What the registration did to the suspect.
+    /// The linear part of the registration.
     pub alignment: Alignment,
-    /// What moved the vertices smoothly besides the mark; null when it was not estimated.
+    /// The smooth deformation besides the mark; null when it was not estimated.
     pub deformation: Option<DeformationEntry>,
-    /// Vertices of the reference without a counterpart.
+    /// Number of reference vertices without a match.
     pub missing: usize,
-    /// Vertices of the suspect without a counterpart.
+    /// Number of suspect vertices without a match.
     pub inserted: usize,
-    /// Some of the vertices, a few for every piece of the map.
+    /// A sample of the vertices, spread over the map.
     pub sample: Sample,
     /// Rings and lines of the reference, thinned, CRS units.
     #[serde(skip)]
     pub lines: Vec<Vec<[f64; 2]>>,
 }
 
-/// A patch on the map.
+/// The place of a patch on the map.
 #[derive(Debug, Clone, Serialize)]
 pub struct PatchPlace {
-    /// Convex hull of its vertices, CRS units.
+    /// Convex hull of the vertices, CRS units.
     pub outline: Vec<[f64; 2]>,
-    /// How many vertices it has.
+    /// Number of vertices.
     pub vertices: usize,
-    /// Those with a counterpart.
+    /// Number of vertices with a match.
     pub matched: usize,
 }
 
-/// The linear part of the registration, in terms of the ground.
+/// The linear part of the registration, measured on the ground.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Alignment {
-    /// How far the middle of the suspect was shifted, metres.
+    /// Shift of the middle of the suspect, metres.
     pub shift_m: [f64; 2],
-    /// How far it was turned, degrees, counter-clockwise.
+    /// Rotation, degrees, counter-clockwise.
     pub turn_deg: f64,
-    /// The largest and the smallest factor by which lengths were stretched.
+    /// The largest and the smallest factor of length.
     pub stretch: [f64; 2],
-    /// Whether it was mirrored.
+    /// Whether the map is mirrored.
     pub mirrored: bool,
 }
 
 /// Hyper-parameters of the deformation.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct DeformationEntry {
-    /// Its standard deviation, metres; 0 where there is none.
+    /// Standard deviation, metres; 0 without a deformation.
     pub deviation_m: f64,
-    /// The distance over which it changes, metres.
+    /// Range of the covariance, metres.
     pub range_m: f64,
 }
 
-/// Vertices, thinned.
+/// A sample of the vertices.
 #[derive(Debug, Clone, Serialize)]
 pub struct Sample {
-    /// Matched: x and y in the reference, CRS units, displacement in x and y, metres.
+    /// Matched vertices: x and y in the reference, CRS units, displacement in x and y, metres.
     pub matched: Vec<[f64; 4]>,
-    /// Of the reference without a counterpart.
+    /// Reference vertices without a match, CRS units.
     pub missing: Vec<[f64; 2]>,
-    /// Of the suspect without a counterpart, within the extent of the reference.
+    /// Suspect vertices without a match, within the extent of the reference, CRS units.
     pub inserted: Vec<[f64; 2]>,
 }
 
 impl Scene<'_> {
-    /// Thins the map.
+    /// Returns the thinned map.
     pub fn sketch(&self, registration: &Registration) -> Sketch {
         let reference = self.matched.reference;
         let coords = self.coords();
@@ -133,7 +134,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Places of the suspect's vertices without a counterpart.
+    /// Returns the places of suspect vertices without a match.
     fn inserted(&self) -> Vec<[f64; 2]> {
         let moved = &self.matched.moved;
         let mut taken = vec![false; moved.len()];
@@ -159,7 +160,7 @@ impl Scene<'_> {
     }
 }
 
-/// Arrows need more room than marks.
+/// Number of cells for arrows, which need more room than points.
 pub(crate) const ARROWS: usize = 44;
 const MARKS: usize = 72;
 
