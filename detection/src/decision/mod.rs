@@ -197,11 +197,11 @@ pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64
 
 /// Decides for a suspect without a visible mark. The verdict is "no match" where a mark of full
 /// amplitude is expected to pass both tests, that of the key with a margin.
-fn unseen(found: &Demodulation, bits: usize, significance: f64) -> (Verdict, String) {
-    let needed = (-2.0 * significance.ln()).sqrt(); // this bounds the normal quantile from above
+fn unseen(found: &Demodulation, bits: usize, each: f64) -> (Verdict, String) {
+    let needed = (-2.0 * each.ln()).sqrt(); // this bounds the normal quantile from above
     if (found.estimate.len() as f64).sqrt() <= needed {
         let reason = format!(
-            "a message of {bits} bits is too short for its absence to show at a significance of {significance:.1e}: give \
+            "a message of {bits} bits is too short for its absence to show at a significance of {each:.1e}: give \
              a larger one, or mark with {} bits or more",
             (needed * needed) as usize + 1
         );

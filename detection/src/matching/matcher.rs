@@ -1,4 +1,5 @@
-//! Mutual nearest neighbours within the radius t (paper, section 3.5).
+//! Matching within the radius t: mutual nearest neighbours (paper, section 3.5), and for the joint
+//! demodulator those among all near vertices whose neighbours along rings and lines match too.
 
 use super::{
     joined::{self, Candidate, Graph},
@@ -8,7 +9,7 @@ use meshmark_core::ground::Ground;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-/// Finds reference vertices and suspect vertices that are each other's nearest within a radius.
+/// Finds the suspect vertex of every reference vertex within a radius.
 pub struct Matcher<'a> {
     reference: &'a [[f64; 2]],
     ground: &'a Ground,

@@ -78,7 +78,7 @@ impl Registration {
         self.share >= AGREE
     }
 
-    /// Returns whether more vertices match than by chance.
+    /// Returns whether a fifth of the smaller map matches, which makes costly ways unnecessary.
     pub fn agrees_in_part(&self) -> bool {
         self.share >= SOME_AGREE
     }

@@ -1,7 +1,8 @@
 //! The search for the CRS of the suspect's coordinates: its own, unless they are implausible in it.
 //!
-//! Every likely CRS is a candidate start of the registration, with x and y exchanged or not, and
-//! the one with most matched vertices wins. No key is involved, so many attempts do not reduce the
+//! Every likely CRS is a candidate start of the registration, with x and y exchanged or not. The
+//! first one under which most vertices of the smaller map match ends the search; otherwise the one
+//! with most matched vertices wins. No key is involved, so many attempts do not reduce the
 //! significance.
 
 use crate::{
