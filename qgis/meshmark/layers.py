@@ -1,4 +1,4 @@
-"""Layers of QGIS as files: what a layer shows, copied to a GeoPackage, or the file it comes from."""
+"""Layers of QGIS as files: visible content copied to a GeoPackage, or the source file."""
 
 import os
 
@@ -19,7 +19,7 @@ WRITERS = QgsVectorFileWriter
 
 
 class Snapshot:
-    """What a layer shows now, with its filter and unsaved edits: made by the main thread, read by any."""
+    """The content of a layer with its filter and unsaved edits: created in the main thread, read in any."""
 
     def __init__(self, layer):
         if not isinstance(layer, QgsVectorLayer):
@@ -48,7 +48,7 @@ def own_name(layer):
 
 
 def path_of(layer):
-    """The file a layer comes from; None when it is no local file."""
+    """Returns the source file of a layer; None when it is not a local file."""
     path = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source()).get("path") or ""
     return path if os.path.exists(path) else None
 
@@ -61,7 +61,7 @@ def file_of(layer):
 
 
 def copy(snapshots, path, context, feedback):
-    """Writes snapshots as layers of a new GeoPackage and gives their names there, every one only once."""
+    """Writes snapshots as layers of a new GeoPackage and returns their unique names there."""
     total = sum(snapshot.count for snapshot in snapshots)
     done, names = 0, []
     for snapshot in snapshots:

@@ -38,7 +38,7 @@ class Proof:
 
 
 def identity(path):
-    """What no two files of a place share; None without a file. A marked map is put in place as a new one."""
+    """Returns an identity that no two files of a place share; None without a file."""
     try:
         status = os.stat(path)
     except OSError:

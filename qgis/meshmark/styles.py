@@ -1,4 +1,4 @@
-"""How the layers of the evidence look: colours that colour-blind people tell apart (Okabe and Ito 2008)."""
+"""The styles of the evidence layers: colours for colour-blind readers (Okabe and Ito 2008)."""
 
 from qgis.core import (
     QgsArrowSymbolLayer,
@@ -104,7 +104,7 @@ def show_above(layer):
 
 
 class Styler(QgsProcessingLayerPostProcessorInterface):
-    """Gives a layer its look and its place when it is added to the project."""
+    """Sets style and place of a layer when it is added to the project."""
 
     def __init__(self, renderer_of, is_above):
         super().__init__()
@@ -123,7 +123,7 @@ _STYLERS = {}
 
 
 def processor(name):
-    """A post-processor for the layer of this name."""
+    """Returns a post-processor for the layer of this name."""
     is_above = name == "vertex_displacements"
     _STYLERS[name] = Styler(displacements if is_above else patches, is_above)
     return _STYLERS[name]
