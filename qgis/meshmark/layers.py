@@ -40,7 +40,7 @@ class Snapshot:
 
 
 def own_name(layer):
-    """What a layer is called; that of its table where QGIS only named it after the file."""
+    """Returns the name of a layer; that of its table where QGIS named it after the file."""
     source = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
     table, file = source.get("layerName"), os.path.basename(source.get("path") or "")
     generated = [os.path.splitext(file)[0], f"{os.path.splitext(file)[0]} — {table}"]
@@ -54,7 +54,7 @@ def path_of(layer):
 
 
 def file_of(layer):
-    """The file a layer shows as it is; None when the layer filters it, has unsaved edits or is no local file."""
+    """Returns the file that a layer shows unchanged; None with a filter or unsaved edits, or when not local."""
     if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
         return None
     return path_of(layer)

@@ -17,7 +17,7 @@ DECIMALS = 9
 
 
 def labels():
-    """What options are called in the dialog; one that a later driver has is called as the driver calls it."""
+    """Returns the names of options in the dialog; an option of a later driver keeps its own name."""
     return {
         "RECIPIENT": tr("Recipient"),
         "MESSAGE": tr("Message, hexadecimal"),
