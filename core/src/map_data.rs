@@ -1,4 +1,4 @@
-//! What a map is as numbers: what reading fills, and marking and detection use.
+//! The data of a map as numbers, which reading creates and which marking and detection use.
 
 use crate::{
     Error, Result, disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice,
@@ -8,42 +8,44 @@ use crate::{
 /// A map without its file.
 #[derive(Debug, Clone)]
 pub struct MapData {
-    /// Its distinct vertices.
+    /// The distinct vertices.
     pub vertices: VertexTable,
-    /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each pair once.
+    /// The vertices that rings and lines join, as canonical indices [a, b] with a < b, sorted, each
+    /// pair once.
     pub segments: Vec<[u32; 2]>,
-    /// Of every vertex the first vertex of its polygon group, the polygons that shared vertices join; itself when it is in
-    /// none.
+    /// For every vertex the first vertex of its polygon group, which shared vertices join; the
+    /// vertex itself when it is in no group.
     pub polygon_roots: Vec<u32>,
-    /// Attribute texts and their places.
+    /// Attribute texts with their places.
     pub labels: Vec<Label>,
-    /// Rings and lines that have a form of their own.
+    /// Rings and lines with enough vertices to be distinctive.
     pub polylines: Vec<Polyline>,
 }
 
-/// What a chain of coordinates is.
+/// The kind of a chain of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChainKind {
     /// A line, or a point.
     Line,
     /// The outer ring of a polygon; its first vertex is repeated at the end.
     Shell,
-    /// An inner ring of the polygon before; its first vertex is repeated at the end.
+    /// An inner ring of the preceding polygon; its first vertex is repeated at the end.
     Hole,
 }
 
-/// An attribute value of a feature and the feature's place: a landmark, where another map has the same value.
+/// An attribute value of a feature with its place: a landmark, where another map has an equal
+/// value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
-    /// A string, or an integer in decimal.
+    /// The value: a string, or an integer in decimal.
     pub value: String,
-    /// CRS units.
+    /// The place, CRS units.
     pub point: [f64; 2],
-    /// What the point is of.
+    /// The kind of place.
     pub dimension: Dimension,
 }
 
-/// What kind of place a label has. Lines are the least certain: they are cut and merged by others.
+/// The kind of place of a label. Lines are the least certain, as edits cut and merge them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dimension {
     /// The point itself.
@@ -64,16 +66,17 @@ pub struct Polyline {
 }
 
 impl Polyline {
-    /// A ring or a line of fewer vertices cannot be told from others under an affine map.
+    /// The least number of vertices that makes a ring or line distinctive under an affine map.
     pub const LEAST_VERTICES: usize = 5;
 }
 
 impl MapData {
-    /// A map without labels and polylines from its coordinates, CRS units, chain after chain: where each chain starts in
-    /// `coords`, ascending, and what it is. Also the canonical index of the vertex of every coordinate.
+    /// Creates a map without labels and polylines from coordinates, CRS units, chain after chain.
+    /// `starts` holds the ascending index in `coords` of the start of each chain, and the kinds
+    /// describe the chains. Also returns the canonical index of the vertex of every coordinate.
     ///
     /// # Errors
-    /// Coordinates that are not finite, or too many.
+    /// Fails on coordinates that are not finite, and on too many coordinates.
     pub fn from_chains(
         coords: Vec<[f64; 2]>,
         starts: &[u32],
@@ -86,17 +89,17 @@ impl MapData {
         Ok((MapData { vertices, segments, polygon_roots, labels, polylines }, indices))
     }
 
-    /// A map of points alone.
+    /// Creates a map of points alone.
     pub fn of_points(vertices: VertexTable) -> Self {
         let polygon_roots = (0..vertices.len() as u32).collect();
         MapData { vertices, segments: Vec::new(), polygon_roots, labels: Vec::new(), polylines: Vec::new() }
     }
 
-    /// The same map with all its coordinates taken elsewhere, for example into another CRS, by `place`. Vertices that fall
-    /// together become one.
+    /// Returns the same map with all coordinates transformed by `place`, for example into another
+    /// CRS. Coincident vertices become one.
     ///
     /// # Errors
-    /// Those of `place` and of [`MapData::from_chains`].
+    /// Returns the errors of `place` and of [`MapData::from_chains`].
     pub fn moved<E: From<Error>>(
         &self,
         place: impl Fn(Vec<[f64; 2]>) -> std::result::Result<Vec<[f64; 2]>, E>,
@@ -118,14 +121,14 @@ impl MapData {
         Ok(MapData { vertices, segments, polygon_roots: joined.roots(), labels, polylines })
     }
 
-    /// The map as the algorithm sees it.
+    /// Returns the map as input of the algorithm.
     pub fn on<'a>(&'a self, ground: Ground, lattice: Option<&'a ScaleLattice>) -> Map<'a> {
         let MapData { vertices, segments, polygon_roots, .. } = self;
         Map { vertices, segments, polygon_roots, ground, lattice }
     }
 }
 
-/// Where each chain of coordinates begins and ends, by its index.
+/// Returns the indices of each chain of coordinates.
 fn chains<'a>(indices: &'a [u32], starts: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
     let ends = starts.iter().skip(1).map(|&start| start as usize).chain([indices.len()]);
     starts.iter().zip(ends).map(|(&start, end)| &indices[start as usize..end])
@@ -135,7 +138,7 @@ fn segments(indices: &[u32], starts: &[u32]) -> Vec<[u32; 2]> {
     distinct(chains(indices, starts).flat_map(|chain| chain.windows(2)).map(|pair| [pair[0], pair[1]]))
 }
 
-/// Segments of two vertices in canonical order, each once.
+/// Returns segments with their two vertices in canonical order, each once.
 fn distinct(segments: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
     let segments = segments.filter(|[a, b]| a != b).map(|[a, b]| [a.min(b), a.max(b)]);
     let mut segments: Vec<[u32; 2]> = segments.collect();
@@ -145,7 +148,8 @@ fn distinct(segments: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
     segments
 }
 
-/// Joins the vertices of every polygon, holes and all: of each of `vertices` vertices the first one it is joined to.
+/// Joins the vertices of every polygon, holes included. Returns for each of `vertices` vertices the
+/// first one that it is joined to.
 fn polygon_roots(
     indices: &[u32],
     starts: &[u32],
@@ -171,7 +175,7 @@ mod tests {
 
     #[test]
     fn segments_join_neighbours_of_a_chain_once_and_no_vertex_with_itself() {
-        // A triangle 0 1 2 0, a line 2 1 1 3 along one of its sides, a point 4.
+        // The chains are a triangle 0 1 2 0, a line 2 1 1 3 along one of its sides, and a point 4.
         let indices = [0, 1, 2, 0, 2, 1, 1, 3, 4];
         assert_eq!(segments(&indices, &[0, 4, 8]), [[0, 1], [0, 2], [1, 2], [1, 3]]);
         assert_eq!(segments(&[], &[]), Vec::<[u32; 2]>::new());
@@ -180,7 +184,8 @@ mod tests {
     #[test]
     fn polygons_are_joined_by_shared_vertices_and_to_their_holes_but_not_by_lines() {
         use ChainKind::{Hole, Line, Shell};
-        // A polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to 8, a polygon 9 10 11.
+        // The chains are a polygon 3 4 5 with the hole 0 1 2, its neighbour 5 6 7, a line from 7 to
+        // 8, and a polygon 9 10 11.
         let indices = [3, 4, 5, 3, 0, 1, 2, 0, 5, 6, 7, 5, 7, 8, 9, 10, 11, 9];
         let kinds = [Shell, Hole, Shell, Line, Shell];
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Coordinates as they are read: rings, lines and points, one after the other.
+//! Chains of coordinates in reading order: rings, lines and points, one after the other.
 
 use crate::{
     Error, Result,
@@ -13,18 +13,18 @@ use std::collections::BTreeMap;
 #[derive(Clone, Default)]
 pub(crate) struct Chains {
     pub(crate) coords: Vec<[f64; 2]>,
-    /// The index in `coords` where each of them starts, ascending.
+    /// The index in `coords` where each chain starts, ascending.
     pub(crate) starts: Vec<u32>,
-    /// The kind of each of them.
+    /// The kind of each chain.
     pub(crate) kinds: Vec<Step>,
-    /// The number of the first of them in each geometry, ascending.
+    /// The number of the first chain of each geometry, ascending.
     pub(crate) firsts: Vec<u32>,
-    /// The geometries that their chains do not describe completely, by their numbers.
+    /// The geometries that their chains do not describe completely, by number.
     pub(crate) others: BTreeMap<u32, Vec<u8>>,
 }
 
 impl Chains {
-    /// What each of them is to polygons.
+    /// Returns the role of each chain in polygons.
     pub(crate) fn chain_kinds(&self) -> impl Iterator<Item = ChainKind> {
         self.kinds.iter().map(|step| match step {
             Step::Shell => ChainKind::Shell,

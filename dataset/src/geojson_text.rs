@@ -68,7 +68,8 @@ pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
     Some([b"{".as_slice(), &kept.join(&b','), b"}"].concat())
 }
 
-/// Whether a foreign member of a feature or its geometry holds a geometry or a bounding box, which nobody marks.
+/// Returns whether a foreign member of a feature or its geometry holds a geometry or a bounding
+/// box, which stays unmarked.
 pub fn has_foreign_places(text: &[u8]) -> bool {
     let all = Text(text);
     let Some(members) = all.members(0..text.len()) else { return false };
@@ -81,7 +82,8 @@ pub fn has_foreign_places(text: &[u8]) -> bool {
     })
 }
 
-/// Inside a text quotes have backslashes before them, so what is found is a key.
+/// Returns whether a text contains a key of places. Quotes inside a string are escaped, so a match
+/// is a key.
 fn names_places(value: &[u8]) -> bool {
     let has = |key: &[u8]| {
         let at = value.windows(key.len()).position(|bytes| bytes == key);
@@ -90,13 +92,13 @@ fn names_places(value: &[u8]) -> bool {
     has(b"\"coordinates\"") || has(b"\"bbox\"")
 }
 
-/// The numbers of a position or a bounding box, as they are written.
+/// Returns the numbers of a position or a bounding box, as written.
 pub fn numbers(list: &[u8]) -> impl Iterator<Item = &[u8]> {
     let inside = list.strip_prefix(b"[").and_then(|list| list.strip_suffix(b"]")).unwrap_or_default();
     inside.split(|byte| *byte == b',').map(<[u8]>::trim_ascii).filter(|number| !number.is_empty())
 }
 
-/// A JSON text; ranges are those of values without blanks around them.
+/// A JSON text; ranges are those of values without surrounding blanks.
 struct Text<'a>(&'a [u8]);
 
 impl<'a> Text<'a> {

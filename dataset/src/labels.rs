@@ -1,11 +1,12 @@
-//! Labels: attribute texts with the place they stand for, from which a verifier makes landmarks.
+//! Labels: attribute texts with the places of their features, from which a verifier makes
+//! landmarks.
 
 use crate::selection::LabelFields;
 use gdal::vector::{Feature, FieldValue};
 use geo::{Centroid, Geometry, HasDimensions, dimensions::Dimensions};
 use meshmark_core::map_data::{Dimension, Label};
 
-/// The labels of one feature, and where they are.
+/// Returns the labels of one feature, with their places.
 pub(crate) fn of_feature(
     feature: &Feature,
     geometry: &Geometry,

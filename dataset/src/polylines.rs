@@ -1,4 +1,4 @@
-//! Rings and lines, by which a verifier recognises features that have no usable attributes.
+//! Rings and lines, from which a verifier recognises features without usable attributes.
 
 use geo::{Geometry, LineString};
 use meshmark_core::map_data::Polyline;

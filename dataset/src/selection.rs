@@ -1,4 +1,4 @@
-//! What to read of a dataset, and how to read it.
+//! The selection: the parts of a dataset to read, and the way to read them.
 
 use crate::{CoordinateSystem, Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
@@ -39,7 +39,7 @@ pub enum TargetCrs<'a> {
     Raw,
 }
 
-/// What to read of a dataset, and how to read it.
+/// The parts of a dataset to read, and the way to read them.
 #[derive(Clone, Copy)]
 pub struct Selection<'a> {
     /// Layers that form the map; all when `None`.

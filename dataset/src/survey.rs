@@ -21,28 +21,28 @@ use meshmark_core::{
 };
 use std::collections::BTreeMap;
 
-/// A map as the mark sees it.
+/// A map as marking and verification read it.
 #[derive(Debug)]
 pub struct Survey {
-    /// Its numbers.
+    /// The data of the map.
     pub data: MapData,
-    /// Its CRS: the common one of its layers, or the one it was reprojected into.
+    /// The CRS: the common one of the layers, or the target of a reprojection.
     pub crs: Option<CoordinateSystem>,
-    /// Metres per unit; `None` where the map has no CRS and could be in degrees.
+    /// Metres per unit; `None` where the map has no CRS and its units may be degrees.
     ground: Option<Ground>,
-    /// Metres per unit where a vertex is, when they are others.
+    /// Metres per unit at the place of a vertex, where they vary.
     lattice: Option<ScaleLattice>,
-    /// The geometries in the order they were read, if they were asked for.
+    /// The geometries in the order of reading, if they were requested.
     pub geometries: Option<Geometries>,
-    /// How many features each layer that was read has, by the layer's number in the dataset.
+    /// The number of features of each layer read, by the number of the layer in the dataset.
     pub features: BTreeMap<usize, u64>,
 }
 
 impl Survey {
-    /// The same map with all its coordinates taken into another CRS by `bring`.
+    /// Returns the same map with all coordinates transformed into another CRS by `bring`.
     ///
     /// # Errors
-    /// Those of `bring`, and a CRS in which metres mean nothing.
+    /// Returns the errors of `bring`, and fails on a CRS without a metric.
     pub(crate) fn brought(
         &self,
         crs: &CoordinateSystem,
@@ -55,26 +55,26 @@ impl Survey {
         Ok(Survey { data, crs, ground, lattice, geometries: None, features })
     }
 
-    /// Metres on the ground.
+    /// Returns the ground metric.
     ///
     /// # Errors
-    /// [`Error::NoCrs`].
+    /// Fails with [`Error::NoCrs`].
     pub fn ground(&self) -> Result<Ground> {
         self.ground.ok_or(Error::NoCrs)
     }
 
-    /// What a map is measured with, when it is no longer needed itself.
+    /// Returns the metric of a map whose data are no longer needed.
     ///
     /// # Errors
-    /// [`Error::NoCrs`].
+    /// Fails with [`Error::NoCrs`].
     pub fn into_scales(self) -> Result<(Ground, Option<ScaleLattice>)> {
         Ok((self.ground()?, self.lattice))
     }
 
-    /// The map as the algorithm sees it.
+    /// Returns the map as input of the algorithm.
     ///
     /// # Errors
-    /// [`Error::NoCrs`].
+    /// Fails with [`Error::NoCrs`].
     pub fn map(&self) -> Result<Map<'_>> {
         Ok(self.data.on(self.ground()?, self.lattice.as_ref()))
     }
@@ -83,8 +83,8 @@ impl Survey {
 /// Reads the vertices, the CRS and the labels of a dataset.
 ///
 /// # Errors
-/// A layer that does not exist or cannot be read to its end, layers of different CRS, coordinates
-/// that are not finite, a CRS in which metres mean nothing.
+/// Fails on a layer that does not exist or cannot be read to its end, layers of different CRS,
+/// coordinates that are not finite, and a CRS without a metric.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let chosen = chosen_layers(dataset, selection.layers)?;
     let mut walk =
@@ -123,7 +123,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Reads a layer; how many features it has.
+    /// Reads a layer and returns its number of features.
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<u64> {
         let columns = self.columns(layer)?;
         let (first_label, first_polyline) = (self.labels.len(), self.polylines.len());
@@ -134,7 +134,7 @@ impl Walk<'_> {
             for (column, chains) in of_column.iter_mut().enumerate() {
                 let extent = match self.selection.target {
                     TargetCrs::Own => Extent::in_crs(columns[column].as_ref()),
-                    TargetCrs::Crs(_) | TargetCrs::Raw => Extent::ANY, // its CRS may be another than it says
+                    TargetCrs::Crs(_) | TargetCrs::Raw => Extent::ANY, // its true CRS may differ
                 };
                 read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
             }
@@ -170,12 +170,12 @@ impl Walk<'_> {
         Ok(features)
     }
 
-    /// Labels and polylines of a feature. Curves have no counterpart in geo and give none.
+    /// Adds labels and polylines of a feature. Curves have no counterpart in geo and add none.
     fn describe(&mut self, feature: &Feature) {
         if matches!(self.selection.labels, LabelFields::None) {
             return;
         }
-        // A null geometry is an error here; `Feature::geometry` would hand out a null pointer.
+        // A null geometry is an error here; `Feature::geometry` would return a null pointer.
         let Ok(geometry) = feature.geometry_by_index(0) else { return };
         if geometry.is_empty() {
             return;
@@ -185,7 +185,7 @@ impl Walk<'_> {
         polylines::of_geometry(&geometry, &mut self.polylines);
     }
 
-    /// The CRS of every geometry column of a layer.
+    /// Returns the CRS of every geometry column of a layer.
     fn columns(&self, layer: &Layer) -> Result<Vec<Option<CoordinateSystem>>> {
         let given = self.selection.srs.map(parse_srs).transpose()?;
         let crs = |own: Option<CoordinateSystem>| match (own, &given) {
@@ -200,7 +200,7 @@ impl Walk<'_> {
         fields.map(|field| crs(field.spatial_ref().ok().and_then(CoordinateSystem::of_layer))).collect()
     }
 
-    /// Layers that share one mesh share one CRS.
+    /// Checks that the layers, which share one mesh, share one CRS.
     fn check_crs(&mut self, layer: &str, crs: &Option<CoordinateSystem>) -> Result<()> {
         let Some((first, first_crs)) = &self.crs else {
             self.crs = Some((layer.into(), crs.clone()));

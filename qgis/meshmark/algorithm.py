@@ -1,4 +1,4 @@
-"""What the three algorithms share."""
+"""The common part of the three algorithms."""
 
 import os
 
@@ -10,13 +10,13 @@ from .commands import Cancelled
 from .driver import Missing
 from .text import tr
 
-# What ogr2ogr says after the driver said why.
+# The messages that ogr2ogr appends to the reason of the driver.
 CONSEQUENCE = "MESHMARK driver failed to create "
 ICON = os.path.join(os.path.dirname(__file__), "icon.svg")
 
 
 class Algorithm(QgsProcessingAlgorithm):
-    """A subclass names its NAME, its `title`, its `about`, and what `needs` to be installed."""
+    """A subclass defines NAME, `title`, `about`, and the programs that it `needs`."""
 
     NAME = ""
 
@@ -27,7 +27,7 @@ class Algorithm(QgsProcessingAlgorithm):
         raise NotImplementedError
 
     def needs(self):
-        """Raises Missing when something is not installed."""
+        """Raises Missing when a required program is not installed."""
         raise NotImplementedError
 
     def createInstance(self):
@@ -57,7 +57,7 @@ class Algorithm(QgsProcessingAlgorithm):
     def add(self, parameter, help_text):
         """Adds a parameter with its help, which the dialog shows beside it and as a tooltip."""
         parameter.setHelp(help_text)
-        # The framework owns it from here on.
+        # The framework owns the parameter from here on.
         self.addParameter(parameter)
 
     def createCustomParametersWidget(self, parent=None):
@@ -73,7 +73,7 @@ class Algorithm(QgsProcessingAlgorithm):
         return True, ""
 
     def objection(self, parameters, context):
-        """What no value by itself shows: why the run cannot begin, None when it can."""
+        """Returns why the run cannot begin with this combination of values, None when it can."""
         return None
 
     def checkParameterValues(self, parameters, context):
@@ -92,22 +92,22 @@ class Algorithm(QgsProcessingAlgorithm):
         return self.prepare(parameters, context, feedback)
 
     def processAlgorithm(self, parameters, context, feedback):
-        # QGIS shows a traceback of any exception but its own, subclasses included.
+        # QGIS shows a traceback for any exception except its own class, subclasses included.
         try:
             return self.process(parameters, context, feedback)
         except (Cancelled, Missing) as reason:
             raise QgsProcessingException(str(reason)) from reason
 
     def prepare(self, parameters, context, feedback):
-        """In the main thread, before the run: what has to do with layers of the project."""
+        """Prepares layers of the project, in the main thread, before the run."""
         raise NotImplementedError
 
     def process(self, parameters, context, feedback):
-        """The run, in a thread of its own."""
+        """Runs the algorithm in a thread of its own."""
         raise NotImplementedError
 
     def map_layer(self, parameters, name, context):
-        """The file of a layer, or what it shows as a Snapshot."""
+        """Returns the file of a layer, or its visible content as a Snapshot."""
         layer = self.parameterAsVectorLayer(parameters, name, context)
         if layer is None:
             raise QgsProcessingException(self.invalidSourceError(parameters, name))
@@ -123,11 +123,11 @@ class Inputs:
         self._is_kept = bool(report)
 
     def place(self, given, name):
-        """Where the copy of what `map_layer` gave goes; None of a file."""
+        """Returns the place for a copy of the Snapshot from `map_layer`; None for a file."""
         return None if isinstance(given, str) else f"{self._base}{name}.gpkg"
 
     def path(self, given, name, context, feedback):
-        """The path of what `map_layer` gave, a Snapshot copied."""
+        """Returns the path of the map from `map_layer`; a Snapshot is copied first."""
         place = self.place(given, name)
         if place is None:
             return given
@@ -140,7 +140,7 @@ class Inputs:
 
 
 def sentences(errors):
-    """What programs of GDAL and meshmark printed as errors and as warnings, without their prefixes."""
+    """Returns the errors and warnings that GDAL and meshmark printed, without prefixes."""
     found, warned, other = [], [], []
     for line in filter(None, map(str.strip, errors.splitlines())):
         kind, _, rest = line.partition(": ")
@@ -150,5 +150,5 @@ def sentences(errors):
             found.append(rest)
         else:
             other.append(line)
-    # The rest only says that it failed, when it is said why.
+    # The other messages only repeat the failure when a reason is known.
     return found or other, warned

@@ -17,9 +17,9 @@ from .text import tr
 
 Finished = namedtuple("Finished", "code output errors")
 
-# How often a running program is looked after, seconds.
+# Interval between checks of a running program, seconds.
 PATIENCE = 0.1
-# How long it may take to end once it was asked to, seconds.
+# Time a program has to end after the request to do so, seconds.
 GRACE = 5
 
 
@@ -31,7 +31,7 @@ class Cancelled(Exception):
 
 
 def meshmark():
-    """The path of the command meshmark."""
+    """Returns the path of the command meshmark."""
     path = settings.get(settings.COMMAND)
     if path and not shutil.which(path):
         raise Missing(
@@ -52,7 +52,7 @@ def meshmark():
 
 
 def ogr2ogr():
-    """The path of GDAL's ogr2ogr, that of this QGIS first."""
+    """Returns the path of GDAL's ogr2ogr, preferably that of this QGIS."""
     beside = os.path.join(QgsApplication.prefixPath(), "bin", "ogr2ogr")
     found = shutil.which(beside) or shutil.which("ogr2ogr")
     if not found:
@@ -61,14 +61,14 @@ def ogr2ogr():
 
 
 def has_option(subcommand, option):
-    """Whether `meshmark SUBCOMMAND` of the installed version has an option."""
+    """Returns whether `meshmark SUBCOMMAND` of the installed version has an option."""
     with _startable(meshmark()):
         asked = subprocess.run([meshmark(), subcommand, "--help"], capture_output=True, **_without_window())
     return re.search(rb"^\s+%s\b" % re.escape(option.encode()), asked.stdout, re.MULTILINE) is not None
 
 
 def run(arguments, feedback, on_output=lambda text: None):
-    """Runs a program to its end; `on_output` is told what it prints. Raises Cancelled when the user cancels."""
+    """Runs a program to its end; `on_output` receives its output. Raises Cancelled on cancellation."""
     with _startable(arguments[0]):
         process = subprocess.Popen(
             arguments,
@@ -98,7 +98,7 @@ def run(arguments, feedback, on_output=lambda text: None):
 
 @contextlib.contextmanager
 def all_or_nothing(paths):
-    """Takes back the files that came into being when what writes them is cancelled or fails between them."""
+    """Removes the new files when their writer is cancelled or fails between them."""
     new = [path for path in paths if path and not os.path.lexists(path)]
     try:
         yield
@@ -111,7 +111,7 @@ def all_or_nothing(paths):
 
 @contextlib.contextmanager
 def _startable(program):
-    """Says so when the system cannot start a program: one of another machine, or no program at all."""
+    """Reports a program that the system cannot start, such as one for another machine."""
     try:
         yield
     except OSError as error:

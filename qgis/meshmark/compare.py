@@ -16,7 +16,7 @@ from .text import tr
 from .verify import answer
 
 
-# Ends the names of figures that the command gives as shares of one.
+# The ending of the names of figures that the command gives as shares of one.
 PERCENT = "_PERCENT"
 
 
@@ -95,7 +95,7 @@ class Compare(Algorithm):
 
 
 def figures():
-    """Name, label, and where the command's JSON has the figure."""
+    """Name, label, and place of the figure in the JSON of the command."""
     return [
         ("FEATURES", tr("Features compared"), ("compared", "features")),
         ("VERTICES", tr("Vertices compared"), ("compared", "vertices")),

@@ -1,4 +1,4 @@
-"""The dialog of the algorithms: QGIS's own, but for what gets in the way of marking."""
+"""The dialog of the algorithms: that of QGIS, adapted to marking."""
 
 from processing.gui.AlgorithmDialog import AlgorithmDialog
 from processing.gui.ParametersPanel import ParametersPanel
@@ -24,12 +24,12 @@ class Dialog(AlgorithmDialog):
 
 
 class WheelScrolls(QObject):
-    """The wheel scrolls the panel: over a box it does not change what was chosen."""
+    """Lets the wheel scroll the panel, so that it does not change the choice in a box."""
 
     def eventFilter(self, watched, event):  # noqa: N802, Qt calls it so
         if event.type() != QEvent.Type.Wheel:
             return False
-        # Who ignores an event leaves it to the widget below.
+        # An ignored event goes to the widget below.
         event.ignore()
         return True
 
@@ -44,10 +44,10 @@ class Panel(ParametersPanel):
         self._leave_first_layer_open()
 
     def _leave_first_layer_open(self):
-        """Of two maps that are compared QGIS would preset the same layer; the original is chosen by whoever has it."""
+        """Clears the preset of the original: QGIS would preset one layer for both maps."""
         maps = [p.name() for p in self.algorithm().parameterDefinitions() if p.type() == "vector"]
         for name in maps[:1]:
-            # A QgsMapLayerComboBox, which Python takes for a plain one. The empty layer is the first.
+            # Python sees this QgsMapLayerComboBox as a plain one. The empty layer is the first.
             box = self.wrappers[name].wrappedWidget().findChild(QComboBox)
             box.setProperty("allowEmptyLayer", True)
             box.setCurrentIndex(0)
@@ -58,7 +58,7 @@ class Panel(ParametersPanel):
 
 
 class ExportPanel(Panel):
-    """The recipient comes first, the file for him next; keys are made here."""
+    """Puts the recipient first and the file next, and adds a button for new keys."""
 
     def initWidgets(self):  # noqa: N802, QGIS calls it so
         super().initWidgets()
@@ -86,7 +86,7 @@ class ExportPanel(Panel):
 
     def _insert_below_recipient(self, widget, distance):
         recipient = self.wrappers["RECIPIENT"].wrappedWidget()
-        # The form takes the widget over only while Python holds the form.
+        # The form takes ownership of the widget only while Python holds the form.
         form = recipient.parentWidget()
         layout = form.layout()
         layout.insertWidget(layout.indexOf(recipient) + distance, widget)
@@ -109,6 +109,6 @@ class ExportPanel(Panel):
 
 
 def keep_last_action(menu):
-    """Of "Save to a Temporary File" and "Save to File…" only the latter suits a file that is handed out."""
+    """Keeps "Save to File…" only, as a temporary file does not suit a file for a recipient."""
     for action in menu.actions()[:-1]:
         menu.removeAction(action)

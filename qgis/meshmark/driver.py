@@ -1,4 +1,4 @@
-"""The GDAL driver MESHMARK: where it is, which options it has, and how an export that was killed is cleared away."""
+"""The GDAL driver MESHMARK: its place, its options, and the cleanup after a killed export."""
 
 import contextlib
 import glob
@@ -16,11 +16,11 @@ Option = namedtuple("Option", "name type default least most choices help")
 
 
 class Missing(Exception):
-    """A program or driver is not there; the message says how to install it."""
+    """A program or driver is missing; the message explains how to install it."""
 
 
 def find():
-    """The driver, loaded from the folder of the settings when GDAL does not have it yet."""
+    """Returns the driver; loads it from the folder in the settings if GDAL lacks it."""
     driver = gdal.GetDriverByName("MESHMARK")
     folder = settings.get(settings.DRIVER_FOLDER)
     reason = ""
@@ -44,7 +44,7 @@ def find():
 
 
 def options():
-    """The creation options of the driver, as it lists them."""
+    """Returns the creation options of the driver, in its order."""
     listed = ElementTree.fromstring(find().GetMetadataItem(gdal.DMD_CREATIONOPTIONLIST))
     return [
         Option(
@@ -61,7 +61,7 @@ def options():
 
 
 def environment():
-    """The environment of a child process that shall find the driver."""
+    """Returns the environment in which a child process finds the driver."""
     variables = dict(os.environ)
     folder = settings.get(settings.DRIVER_FOLDER)
     # It replaces the folder where GDAL finds an installed driver, so one without a driver must not.
@@ -71,7 +71,7 @@ def environment():
 
 
 def clear_away(target, creation_options):
-    """Removes what a killed export to `target` left. Whoever next writes to a place clears it: begin, and give up."""
+    """Removes the remains of a killed export to `target`, by starting a new one and cancelling it."""
     with _quiet():
         dataset = find().Create(f"MESHMARK:{target}", 0, 0, 0, gdal.GDT_Unknown, creation_options)
         del dataset
@@ -89,7 +89,7 @@ def _search_path(folder):
 
 @contextlib.contextmanager
 def _quiet():
-    """GDAL prints nothing and raises nothing."""
+    """Keeps GDAL from printing and raising."""
     raises = gdal.GetUseExceptions()
     gdal.DontUseExceptions()
     gdal.PushErrorHandler("CPLQuietErrorHandler")

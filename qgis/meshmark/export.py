@@ -24,7 +24,8 @@ from .driver import Missing
 from .proof import Proof
 from .text import tr
 
-# Options of the driver that the algorithm sets itself: paths, and what follows from the layers and the file name.
+# Driver options that the algorithm sets itself: paths, and those that follow from the layers and
+# the file name.
 OWN = {"KEY", "RECORD", "REFERENCE", "LAYERS", "FORMAT"}
 
 
@@ -61,7 +62,7 @@ class Export(Algorithm):
                 tr("Who receives this copy; required, unless a message is given (advanced parameters)."),
             )
         output = QgsProcessingParameterFileDestination("OUTPUT", tr("Marked map"), file_filter())
-        # A file that exists is refused, whatever the answer.
+        # An existing file is refused, whatever the answer.
         output.setMetadata({"widget_wrapper": {"dontconfirmoverwrite": True}})
         self.add(
             output,
@@ -93,7 +94,7 @@ class Export(Algorithm):
 
     @staticmethod
     def _driver_options():
-        """None without the driver: then the algorithm only says that it is missing."""
+        """Returns None without the driver; the algorithm then only reports that it is missing."""
         try:
             return [option for option in driver.options() if option.name not in OWN]
         except Missing:
@@ -129,7 +130,7 @@ class Export(Algorithm):
         values.update(KEY=self.parameterAsString(given, "KEY", context), RECORD=record, REFERENCE=reference)
         options = [f"{name}={value}" for name, value in values.items() if value]
 
-        # What is staged is unmarked: the folder is the user's alone, and goes with the run.
+        # Staged files are unmarked, so the folder is private and is removed after the run.
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
             source = os.path.join(staging, "source.gpkg")
             feedback.setProgressText(tr("Copying the layers"))
@@ -150,7 +151,7 @@ class Export(Algorithm):
 
 
 def is_kept(path, context):
-    """Whether a path is given that QGIS does not clear away when it ends, as it does those of its temporary folder."""
+    """Returns whether a path is given outside the temporary folder, which QGIS clears when it ends."""
     folders = [QgsProcessingUtils.tempFolder()]
     # Later versions of QGIS have one for each context, too.
     if hasattr(context, "temporaryFolder") and context.temporaryFolder():
@@ -160,7 +161,7 @@ def is_kept(path, context):
 
 
 def export(source, output, options, feedback):
-    """Marks a file by a child process, which can be stopped."""
+    """Marks a file in a child process, which can be stopped."""
     feedback.setProgressText(tr("Marking"))
     arguments = [commands.ogr2ogr(), "-progress", "-f", "MESHMARK", f"MESHMARK:{output}", source]
     for option in options:
@@ -184,13 +185,13 @@ def export(source, output, options, feedback):
 
 
 def percent(text):
-    """How far ogr2ogr says it is: "0...10...20"."""
+    """Returns the progress that ogr2ogr prints: "0...10...20"."""
     numbers = re.findall(r"\d+", text)
     return float(numbers[-1]) if numbers else 0.0
 
 
 def check_places(output, folder, overwrite):
-    """Says what is wrong with the places of the outputs before anything is copied."""
+    """Reports unusable output paths before the first copy."""
     if not os.path.isdir(folder):
         raise QgsProcessingException(
             tr("The record folder {} does not exist: make it, or choose another.").format(folder or '""')
@@ -204,7 +205,7 @@ def check_places(output, folder, overwrite):
 
 
 def check_is_no_source(output, snapshots):
-    """Only the layers of this export would be left of the file, and those only marked."""
+    """Reports an output that would replace its own source with marked layers alone."""
     for snapshot in snapshots:
         if snapshot.file and os.path.exists(output) and os.path.samefile(snapshot.file, output):
             raise QgsProcessingException(
@@ -213,7 +214,7 @@ def check_is_no_source(output, snapshots):
 
 
 def free_names(folder, stem):
-    """Names of a record and a reference that do not exist: those of an earlier copy are never replaced."""
+    """Returns unused names for record and reference, as those of an earlier copy are never replaced."""
     number = 1
     while True:
         base = os.path.join(folder, stem if number == 1 else f"{stem}-{number}")
@@ -224,7 +225,7 @@ def free_names(folder, stem):
 
 
 def layers_of(path):
-    """What QGIS opens the layers of a file by."""
+    """Returns the URIs by which QGIS opens the layers of a file."""
     dataset = gdal.OpenEx(path, gdal.OF_VECTOR)
     names = [dataset.GetLayer(i).GetName() for i in range(dataset.GetLayerCount())]
     return [path] if len(names) == 1 else [f"{path}|layername={name}" for name in names]

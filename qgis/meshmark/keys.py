@@ -25,14 +25,14 @@ def make(path):
 
 
 def ask_and_make(parent):
-    """Asks for a file and makes a key there; gives its path, None when none was made."""
+    """Asks for a file and makes a key there; returns its path, None without a key."""
     folder = os.path.dirname(settings.get(settings.KEY_FILE)) or os.path.expanduser("~")
     path, _ = QFileDialog.getSaveFileName(
         parent,
         tr("New key"),
         os.path.join(folder, "key.json"),
         tr("Key files (*.json)"),
-        # A key that exists is refused below, whatever the answer.
+        # An existing key is refused below, whatever the answer.
         options=QFileDialog.Option.DontConfirmOverwrite,
     )
     if not path:

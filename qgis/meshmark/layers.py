@@ -1,4 +1,4 @@
-"""Layers of QGIS as files: what a layer shows, copied to a GeoPackage, or the file it comes from."""
+"""Layers of QGIS as files: visible content copied to a GeoPackage, or the source file."""
 
 import os
 
@@ -19,7 +19,7 @@ WRITERS = QgsVectorFileWriter
 
 
 class Snapshot:
-    """What a layer shows now, with its filter and unsaved edits: made by the main thread, read by any."""
+    """The content of a layer with its filter and unsaved edits: created in the main thread, read in any."""
 
     def __init__(self, layer):
         if not isinstance(layer, QgsVectorLayer):
@@ -40,7 +40,7 @@ class Snapshot:
 
 
 def own_name(layer):
-    """What a layer is called; that of its table where QGIS only named it after the file."""
+    """Returns the name of a layer; that of its table where QGIS named it after the file."""
     source = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
     table, file = source.get("layerName"), os.path.basename(source.get("path") or "")
     generated = [os.path.splitext(file)[0], f"{os.path.splitext(file)[0]} — {table}"]
@@ -48,20 +48,20 @@ def own_name(layer):
 
 
 def path_of(layer):
-    """The file a layer comes from; None when it is no local file."""
+    """Returns the source file of a layer; None when it is not a local file."""
     path = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source()).get("path") or ""
     return path if os.path.exists(path) else None
 
 
 def file_of(layer):
-    """The file a layer shows as it is; None when the layer filters it, has unsaved edits or is no local file."""
+    """Returns the file that a layer shows unchanged; None with a filter or unsaved edits, or when not local."""
     if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
         return None
     return path_of(layer)
 
 
 def copy(snapshots, path, context, feedback):
-    """Writes snapshots as layers of a new GeoPackage and gives their names there, every one only once."""
+    """Writes snapshots as layers of a new GeoPackage and returns their unique names there."""
     total = sum(snapshot.count for snapshot in snapshots)
     done, names = 0, []
     for snapshot in snapshots:

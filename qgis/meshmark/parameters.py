@@ -17,7 +17,7 @@ DECIMALS = 9
 
 
 def labels():
-    """What options are called in the dialog; one that a later driver has is called as the driver calls it."""
+    """Returns the names of options in the dialog; an option of a later driver keeps its own name."""
     return {
         "RECIPIENT": tr("Recipient"),
         "MESSAGE": tr("Message, hexadecimal"),
@@ -35,7 +35,7 @@ def labels():
 
 
 def parameter(option):
-    """The parameter for an option of the driver."""
+    """Returns the parameter for an option of the driver."""
     label = labels().get(option.name, option.name)
     optional = option.default is None
     if option.choices == SWITCH:
@@ -62,7 +62,7 @@ def advanced(made):
 
 
 def value(algorithm, option, parameters, context):
-    """The text of an option, None where it is not given."""
+    """Returns the text of an option, None where it is not given."""
     definition = algorithm.parameterDefinition(option.name)
     given = parameters.get(option.name)
     if given in (None, "") and definition.defaultValue() is None:

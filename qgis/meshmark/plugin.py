@@ -1,4 +1,4 @@
-"""What QGIS starts and stops: the provider, the settings page, the entries in menus and in a toolbar."""
+"""The plugin that QGIS starts and stops: provider, settings page, menu and toolbar entries."""
 
 from qgis.core import QgsApplication, QgsMapLayer, QgsMapLayerType
 from qgis.PyQt.QtGui import QIcon
@@ -22,7 +22,7 @@ class MeshmarkPlugin:
         self.dialog = None
 
     def initProcessing(self):
-        """All that `qgis_process` needs."""
+        """Registers the provider, which suffices for `qgis_process`."""
         self.provider = MeshmarkProvider()
         QgsApplication.processingRegistry().addProvider(self.provider)
 
@@ -50,7 +50,7 @@ class MeshmarkPlugin:
         return action
 
     def _button(self, first):
-        """A button for the first action, with all of them in its menu."""
+        """Returns a button for the first action, with all actions in its menu."""
         button = QToolButton()
         button.setPopupMode(QToolButton.ToolButtonPopupMode.MenuButtonPopup)
         menu = QMenu(button)
@@ -86,7 +86,7 @@ class MeshmarkPlugin:
         keys.ask_and_make(self.iface.mainWindow())
 
     def _open_dialog(self, name, given=None):
-        """Opens the dialog of an algorithm, or says what it misses."""
+        """Opens the dialog of an algorithm, or reports what is missing."""
         import processing
 
         ready, missing = QgsApplication.processingRegistry().algorithmById(f"meshmark:{name}").canExecute()

@@ -1,4 +1,4 @@
-"""What shows that a run made its copy: neither an exit code nor a file in the place does, which can be an older one."""
+"""The proof that a run made its copy: an exit code or a file, which may be older, is not enough."""
 
 import json
 import os
@@ -16,7 +16,7 @@ class Proof:
         self._before = identity(output)
 
     def check(self, recipient, message):
-        """Raises unless the file is a new one, with a reference, and with a record that names this recipient or message."""
+        """Raises unless the file is new and has a reference and a record of this recipient or message."""
         found = self._found()
         expected = ("recipient", recipient) if recipient else ("message", message.lower())
         is_new = identity(self._output) not in (None, self._before)
@@ -38,7 +38,7 @@ class Proof:
 
 
 def identity(path):
-    """What no two files of a place share; None without a file. A marked map is put in place as a new one."""
+    """Returns an identity that no two files of a place share; None without a file."""
     try:
         status = os.stat(path)
     except OSError:

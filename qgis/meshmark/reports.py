@@ -37,7 +37,7 @@ class Report:
         return ["--report", self.path] if self.path else []
 
     def open(self):
-        """By the main thread; only where somebody looks at QGIS."""
+        """Opens the report, in the main thread, where QGIS has a window."""
         from qgis.utils import iface
 
         if iface is not None and self._is_opened and os.path.exists(self.path):

@@ -1,4 +1,4 @@
-"""What the user set once for all runs: every setting is a path, empty when it is not set."""
+"""The settings for all runs: every setting is a path, empty when it is not set."""
 
 from qgis.core import QgsSettings
 

@@ -1,4 +1,4 @@
-"""How the layers of the evidence look: colours that colour-blind people tell apart (Okabe and Ito 2008)."""
+"""The styles of the evidence layers: colours for colour-blind readers (Okabe and Ito 2008)."""
 
 from qgis.core import (
     QgsArrowSymbolLayer,
@@ -18,7 +18,7 @@ ARROW_M = 0.003
 
 
 def displacements(layer):
-    """Arrows, exaggerated to a readable length at any scale; the weight is how well one fits in with the others."""
+    """Draws arrows, enlarged to a legible length at any scale; colours show the weight."""
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
     exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
@@ -36,7 +36,7 @@ def displacements(layer):
 
 
 def patches(_layer):
-    """The score is standard normal under a wrong key: beyond 4 once in 30 000 patches."""
+    """Colours scores, which are standard normal under a wrong key: above 4 once in 30 000 patches."""
     return rules(
         [
             (tr("mark shows clearly (6 and more)"), '"score" >= 6', area("#0072b2", 110)),
@@ -91,7 +91,7 @@ def file_of(layer):
 
 
 def show_above(layer):
-    """Moves a layer above those of the same file: where QGIS puts them depends on its version, and on what is selected."""
+    """Moves a layer above those of the same file, as its place in QGIS depends on version and selection."""
     node = layer.project().layerTreeRoot().findLayer(layer.id()) if layer.project() else None
     if node is None:
         return
@@ -104,7 +104,7 @@ def show_above(layer):
 
 
 class Styler(QgsProcessingLayerPostProcessorInterface):
-    """Gives a layer its look and its place when it is added to the project."""
+    """Sets style and place of a layer when it is added to the project."""
 
     def __init__(self, renderer_of, is_above):
         super().__init__()
@@ -118,12 +118,13 @@ class Styler(QgsProcessingLayerPostProcessorInterface):
             show_above(layer)
 
 
-# Until its layer is loaded nobody else keeps a post-processor alive; afterwards QGIS deletes it, so every run has its own.
+# These references keep post-processors alive until their layer is loaded; QGIS deletes them then,
+# so every run has its own.
 _STYLERS = {}
 
 
 def processor(name):
-    """A post-processor for the layer of this name."""
+    """Returns a post-processor for the layer of this name."""
     is_above = name == "vertex_displacements"
     _STYLERS[name] = Styler(displacements if is_above else patches, is_above)
     return _STYLERS[name]

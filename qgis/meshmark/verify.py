@@ -1,4 +1,4 @@
-"""Verify suspect map: what `meshmark verify` says, its report, and the evidence as layers."""
+"""Verify suspect map: the answer of `meshmark verify`, its report, and the evidence as layers."""
 
 import json
 import math
@@ -96,7 +96,7 @@ class Verify(Algorithm):
         return None if self._marks(given, context) else tr("Give a record, or a folder of records.")
 
     def _marks(self, given, context):
-        """The option that names the record, or the folder of records."""
+        """Returns the option that names the record, or the folder of records."""
         record = self.parameterAsString(given, "RECORD", context)
         folder = self.parameterAsString(given, "RECORDS", context)
         return ["--record", record] if record else ["--records", folder] if folder else []
@@ -149,7 +149,7 @@ class Verify(Algorithm):
 
 
 def answer(finished, codes, feedback):
-    """The JSON that the command printed; raises what it says when it failed."""
+    """Returns the JSON of the command; raises its error message when it failed."""
     errors, _ = sentences(finished.errors)
     if finished.code not in codes:
         ended = tr("meshmark ended with exit code {}.").format(finished.code)
@@ -171,7 +171,7 @@ def answer(finished, codes, feedback):
 
 
 def recipients(found):
-    """Whose copies match: several can, when copies were mixed; none without a match."""
+    """Returns the recipients of matching copies: several when copies were mixed, none without a match."""
     if found["verdict"] != "match":
         return []
     if not found["candidates"]:
@@ -180,12 +180,12 @@ def recipients(found):
         most = math.log10(found["parameters"]["significance"])
         tried = [entry for entry in found["candidates"]["list"] if entry["p_value_log10"] is not None]
         named = [entry["recipient"] for entry in tried if entry["p_value_log10"] < most]
-    # Records of one recipient are one answer; a message that was given as bits names nobody.
+    # Records of one recipient count as one answer; a message given as bits names no recipient.
     return list(dict.fromkeys(filter(None, named)))
 
 
 def summary(found):
-    """The answer in a few lines."""
+    """Returns the answer in a few lines."""
     verdicts = {"match": tr("MATCH"), "no-match": tr("NO MATCH"), "inconclusive": tr("INCONCLUSIVE")}
     yield f"{verdicts.get(found['verdict'], found['verdict'])}: {found['reason']}"
     p_log10 = found["p_value_log10"]
