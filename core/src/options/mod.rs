@@ -277,6 +277,36 @@ mod tests {
     }
 
     #[test]
+    fn a_printed_option_parses_to_its_value() {
+        let marking = |pairs: &[(&str, &str)]| Options::parse(pairs.iter().copied()).unwrap();
+        let all = [
+            ("KEY", "a key.json"),
+            ("AMPLITUDE", "0.30000000000000004"),
+            ("CODE", "Repetition"),
+            ("CHIP_RATE", "+7"),
+            ("PATCH_SIZE", "0016"),
+            ("TOLERANCE", "1e-7"),
+            ("PRECISION", "5e-324"),
+            ("LAYERS", r#" "a ""b"", c" ,d"#),
+            ("SHAPE", "rigid"),
+            ("BASIS", "Cotangent"),
+            ("SRS", "EPSG:3067"),
+            ("RECORD", "acme.json"),
+        ];
+        for subject in [("RECIPIENT", " ACME, \"GmbH\""), ("MESSAGE", "C0ffee")] {
+            let given = [&all[..], &[subject]].concat();
+            for options in [marking(&given), marking(&[]), marking(&[subject])] {
+                let texts = OPTIONS.iter().filter_map(|o| Some((o.name, o.text_of(&options)?)));
+                let texts: Vec<_> = texts.collect();
+                let pairs = texts.iter().map(|(name, text)| (*name, text.as_str()));
+                assert_eq!(Options::parse(pairs).unwrap(), options, "{texts:?}");
+            }
+            let printed = OPTIONS.iter().filter(|o| o.text_of(&marking(&given)).is_some()).count();
+            assert_eq!(printed, OPTIONS.len() - 1, "all but the other subject");
+        }
+    }
+
+    #[test]
     fn bad_values_name_the_option_and_what_is_legal() {
         assert!(error(&[("AMPLITUDE", "wide")]).contains("AMPLITUDE=wide is not a number"));
         assert!(error(&[("AMPLITUDE", "0")]).contains("greater than 0"));

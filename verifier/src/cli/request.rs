@@ -3,7 +3,7 @@
 use super::arguments::VerifyArgs;
 use meshmark_core::{
     key::RECIPIENT_BITS,
-    options::{Options, Spelling, Subject},
+    options::{self, Options, Spelling},
     record::Record,
 };
 use meshmark_verifier::{Error, Request, Result, inputs::texts, verify::check_key};
@@ -59,22 +59,13 @@ fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> 
     let recorded = from_record(record)?;
     for (name, value) in flags {
         let alone = Options::parse([(*name, value.as_str())])?;
-        let agrees = match *name {
-            "RECIPIENT" => alone.subject == recorded.subject,
-            "MESSAGE" => matches!(&alone.subject, Some(Subject::Message(m)) if *m == record.message()?),
-            "AMPLITUDE" => alone.parameters.amplitude_m == recorded.parameters.amplitude_m,
-            "CODE" => alone.parameters.code == recorded.parameters.code,
-            "CHIP_RATE" => alone.parameters.chip_rate == recorded.parameters.chip_rate,
-            "PATCH_SIZE" => alone.parameters.patch_size == recorded.parameters.patch_size,
-            "TOLERANCE" => alone.parameters.tolerance_m == recorded.parameters.tolerance_m,
-            "SHAPE" => alone.parameters.shape == recorded.parameters.shape,
-            "BASIS" => alone.parameters.laplacian == recorded.parameters.laplacian,
-            "PRECISION" => alone.parameters.precision == recorded.parameters.precision,
-            "LAYERS" => alone.layers == recorded.layers,
-            "SRS" => alone.srs == recorded.srs,
-            other => unreachable!("{other} does not shape the mark"),
+        let spec = options::spec(name).expect("flags are rows of the table");
+        let on_record = match *name {
+            // A record has the message of its recipient, too.
+            "MESSAGE" => Some(record.message()?.to_hex()),
+            _ => spec.text_of(&recorded),
         };
-        if !agrees {
+        if spec.text_of(&alone) != on_record {
             let flag = Spelling::Flag.value(name, value);
             return Err(Error::Contradiction { flag });
         }
