@@ -7,7 +7,10 @@ use super::{
 };
 use meshmark_core::ground::Ground;
 use rayon::prelude::*;
-use rstar::{AABB, PointDistance, RTree, RTreeObject};
+use rstar::{RTree, primitives::GeomWithData};
+
+/// A vertex in the plane, and its index.
+type Node = GeomWithData<[f64; 2], u32>;
 
 /// Finds the suspect vertex of every reference vertex within a radius.
 pub struct Matcher<'a> {
@@ -18,25 +21,6 @@ pub struct Matcher<'a> {
     origin: [f64; 2],
     x_scale: f64,
     tree: RTree<Node>,
-}
-
-#[derive(Clone, Copy)]
-struct Node {
-    at: [f64; 2],
-    index: u32,
-}
-
-impl RTreeObject for Node {
-    type Envelope = AABB<[f64; 2]>;
-    fn envelope(&self) -> Self::Envelope {
-        AABB::from_point(self.at)
-    }
-}
-
-impl PointDistance for Node {
-    fn distance_2(&self, p: &[f64; 2]) -> f64 {
-        (self.at[0] - p[0]).powi(2) + (self.at[1] - p[1]).powi(2)
-    }
 }
 
 impl<'a> Matcher<'a> {
@@ -92,7 +76,7 @@ impl<'a> Matcher<'a> {
     }
 
     fn tree_of(&self, points: &[[f64; 2]]) -> RTree<Node> {
-        let node = |(i, p): (usize, &[f64; 2])| Node { at: self.plane(*p), index: i as u32 };
+        let node = |(i, p): (usize, &[f64; 2])| Node::new(self.plane(*p), i as u32);
         RTree::bulk_load(points.iter().enumerate().map(node).collect())
     }
 
@@ -115,8 +99,8 @@ impl<'a> Matcher<'a> {
         let reach = radius_m / scale[0].min(scale[1]);
         let at = self.plane(from);
         let distance = move |node: &Node| {
-            let d = ((node.at[0] - at[0]) * scale[0]).hypot((node.at[1] - at[1]) * scale[1]);
-            (d, node.index)
+            let [x, y] = node.geom();
+            (((x - at[0]) * scale[0]).hypot((y - at[1]) * scale[1]), node.data)
         };
         let candidates = tree.locate_within_distance(at, reach * reach * (1.0 + 1e-12));
         candidates.map(distance).filter(move |(d, _)| *d <= radius_m)

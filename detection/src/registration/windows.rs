@@ -9,7 +9,7 @@
 use super::affine::Affine;
 use meshmark_core::{ground::Ground, map_data::Polyline};
 use rayon::prelude::*;
-use rstar::{AABB, PointDistance, RTree, RTreeObject};
+use rstar::{AABB, PointDistance, RTree, RTreeObject, primitives::GeomWithData};
 
 /// Number of vertices of a window.
 const SIZE: usize = 6;
@@ -109,12 +109,12 @@ fn turning(polyline: &Polyline) -> Vec<[f64; 2]> {
 /// Returns the windows of points: each with its five nearest neighbours, anticlockwise. `metric`
 /// maps points to the coordinates in which distances are measured.
 pub fn of_points(points: &[[f64; 2]], metric: impl Fn([f64; 2]) -> [f64; 2] + Sync) -> Vec<Window> {
-    let node = |(index, p): (usize, &[f64; 2])| Place { at: metric(*p), index: index as u32 };
+    let node = |(index, p): (usize, &[f64; 2])| GeomWithData::new(metric(*p), index as u32);
     let tree = RTree::bulk_load(points.iter().enumerate().map(node).collect());
     let window = |p: &[f64; 2]| {
         let at = metric(*p);
         let nearest: Vec<[f64; 2]> =
-            tree.nearest_neighbor_iter(&at).take(SIZE).map(|place| points[place.index as usize]).collect();
+            tree.nearest_neighbor_iter(&at).take(SIZE).map(|place| points[place.data as usize]).collect();
         let mut vertices: [[f64; 2]; SIZE] = nearest.try_into().ok()?;
         let centre = vertices[0];
         let angle = |v: &[f64; 2]| (v[1] - centre[1]).atan2(v[0] - centre[0]);
@@ -122,25 +122,6 @@ pub fn of_points(points: &[[f64; 2]], metric: impl Fn([f64; 2]) -> [f64; 2] + Sy
         Window::new(vertices, Arrangement::Star)
     };
     points.par_iter().filter_map(window).collect()
-}
-
-#[derive(Clone, Copy)]
-struct Place {
-    at: [f64; 2],
-    index: u32,
-}
-
-impl RTreeObject for Place {
-    type Envelope = AABB<[f64; 2]>;
-    fn envelope(&self) -> Self::Envelope {
-        AABB::from_point(self.at)
-    }
-}
-
-impl PointDistance for Place {
-    fn distance_2(&self, p: &[f64; 2]) -> f64 {
-        (self.at[0] - p[0]).powi(2) + (self.at[1] - p[1]).powi(2)
-    }
 }
 
 impl Window {
