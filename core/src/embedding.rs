@@ -211,7 +211,7 @@ impl<'a> Embedding<'a> {
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));
         let observed: Vec<Option<[f64; 2]>> = from.zip(&settled.coords).map(moved).collect();
         let [_, metres_per_unit] = self.map.ground.metres_per_unit(self.map.vertices.centre());
-        let rounding_m = self.parameters.precision.unwrap_or(0.0) * metres_per_unit / 12f64.sqrt();
+        let rounding_m = self.parameters.precision_crs_units.unwrap_or(0.0) * metres_per_unit / 12f64.sqrt();
         let disturbance = Prediction {
             deformation: Deformation::none(rounding_m.hypot(settled.deviation_m).max(LEAST_NOISE_M)),
             displacement_m: Vec::new(),

@@ -101,7 +101,7 @@ impl Patches {
         let mut patches = with_edges(leaves, mesh.edges(), &place);
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
         constrain(&mut patches, &constraints, &place);
-        if parameters.laplacian == Laplacian::Cotangent {
+        if parameters.basis == Laplacian::Cotangent {
             weigh(&mut patches, mesh.triangles(), &place, &points);
         }
         let [_, metres] = ground.metres_per_unit(table.centre());

@@ -16,7 +16,7 @@ impl<'a> Placement<'a> {
     /// [`Error::PrecisionTooCoarse`].
     pub fn new(map: &Map<'a>, parameters: &Parameters) -> Result<Self> {
         check_precision(map, parameters)?;
-        let Parameters { tolerance_m, precision, .. } = *parameters;
+        let Parameters { tolerance_m, precision_crs_units: precision, .. } = *parameters;
         Ok(Placement { measure: map.measure(), tolerance_m, precision })
     }
 
@@ -100,7 +100,7 @@ fn nearest_node(
 }
 
 fn check_precision(map: &Map, parameters: &Parameters) -> Result<()> {
-    let Some(precision) = parameters.precision else { return Ok(()) };
+    let Some(precision) = parameters.precision_crs_units else { return Ok(()) };
     let (min, max) = map.vertices.bounds();
     // A degree of longitude is longest where the map comes nearest to the equator.
     let widest_y = if min[1] <= 0.0 && max[1] >= 0.0 { 0.0 } else { min[1].abs().min(max[1].abs()) };

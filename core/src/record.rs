@@ -2,10 +2,9 @@
 
 use crate::{
     Error, Result,
-    code::Code,
     distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
     message::Message,
-    options::{Laplacian, Parameters, Rigidity, Subject},
+    options::{Options, Parameters, Subject},
 };
 use serde::{Deserialize, Serialize};
 
@@ -30,22 +29,9 @@ pub struct Record {
     /// Whether the key whitened the message before it was coded; omitted when it did not, as for recipients.
     #[serde(default, skip_serializing_if = "is_false")]
     pub whitened: bool,
-    /// α.
-    pub amplitude_m: f64,
-    /// How the message becomes the channel bits.
-    pub code: Code,
-    /// c.
-    pub chip_rate: usize,
-    /// d.
-    pub patch_size: usize,
-    /// No vertex moved further than this.
-    pub tolerance_m: f64,
-    /// Which vertices moved as one.
-    pub shape: Rigidity,
-    /// Which functions carry the mark.
-    pub basis: Laplacian,
-    /// Output grid in CRS units.
-    pub precision_crs_units: Option<f64>,
+    /// The numbers that shaped the mark, fields of their own in the JSON.
+    #[serde(flatten)]
+    pub parameters: Parameters,
     /// Layers that were marked; all when null.
     pub layers: Option<Vec<String>>,
     /// CRS given for a source that had none.
@@ -123,10 +109,9 @@ impl Record {
             let found = record.meshmark_record;
             return Err(Error::Record(format!("version {found} instead of {VERSION}")));
         }
-        record.parameters()?;
-        record.subject()?;
+        record.options()?;
         let bits = record.message()?.len();
-        record.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;
+        record.parameters.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;
         Ok(record)
     }
 
@@ -148,24 +133,21 @@ impl Record {
         serde_json::to_string_pretty(self).expect("a record is JSON") + "\n"
     }
 
-    /// Returns the parameters that shaped the mark.
+    /// Returns the options that made the mark.
     ///
     /// # Errors
-    /// [`Error::Record`] when one of them is out of range.
-    pub fn parameters(&self) -> Result<Parameters> {
-        let values = [
-            ("SHAPE", self.shape.name().into()),
-            ("BASIS", self.basis.name().into()),
-            ("CODE", self.code.name()),
-            ("AMPLITUDE", self.amplitude_m.to_string()),
-            ("CHIP_RATE", self.chip_rate.to_string()),
-            ("PATCH_SIZE", self.patch_size.to_string()),
-            ("TOLERANCE", self.tolerance_m.to_string()),
-        ];
-        let precision = self.precision_crs_units.map(|p| ("PRECISION", p.to_string()));
-        let pairs = values.iter().chain(&precision).map(|(name, value)| (*name, value.as_str()));
-        let options = crate::options::Options::parse(pairs).map_err(|e| Error::Record(e.to_string()))?;
-        Ok(options.parameters)
+    /// Those of [`Record::subject`], and [`Error::Record`] when a value is out of range.
+    pub fn options(&self) -> Result<Options> {
+        let options = Options {
+            key_path: None,
+            subject: Some(self.subject()?),
+            parameters: self.parameters.clone(),
+            layers: self.layers.clone(),
+            srs: self.srs.clone(),
+            record_path: None,
+        };
+        options.check().map_err(|e| Error::Record(e.to_string()))?;
+        Ok(options)
     }
 
     /// Returns the message that was embedded.

@@ -99,7 +99,7 @@ proptest! {
         laplacian in prop_oneof![Just(Laplacian::Biggs), Just(Laplacian::Cotangent)],
     ) {
         let table = VertexTable::new(points).unwrap();
-        let p = Parameters { laplacian, ..small() };
+        let p = Parameters { basis: laplacian, ..small() };
         let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         for patch in patches.as_slice() {
             let n = patch.vertices.len();
@@ -113,7 +113,7 @@ proptest! {
     #[test]
     fn eigenvectors_satisfy_the_cotangent_laplacian(points in vertices()) {
         let table = VertexTable::new(points).unwrap();
-        let p = Parameters { laplacian: Laplacian::Cotangent, patch_size: table.len(), ..small() };
+        let p = Parameters { basis: Laplacian::Cotangent, patch_size: table.len(), ..small() };
         let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
         let basis = Basis::low_frequencies(&patches.as_slice()[0], 100).unwrap();
         let mesh = Mesh::delaunay(&table.local(1.0)).unwrap();
@@ -168,7 +168,7 @@ proptest! {
         precision in prop::sample::select(vec![None, Some(0.1), Some(0.01), Some(0.03)]),
     ) {
         let table = VertexTable::new(points).unwrap();
-        let p = Parameters { tolerance_m, precision, amplitude_m: 0.2, ..small() };
+        let p = Parameters { tolerance_m, precision_crs_units: precision, amplitude_m: 0.2, ..small() };
         for (from, to) in table.coords().iter().zip(marked(&table, &METRES, &p)) {
             prop_assert!((to[0] - from[0]).hypot(to[1] - from[1]) <= tolerance_m);
             if let Some(grid) = precision {
@@ -300,7 +300,7 @@ fn largest_difference(patch: &Patch, count: usize) -> f64 {
 fn another_solver_gives_the_same_basis_on_grids_and_on_patches_that_fall_apart() {
     for table in [grid(20), grid(25), clusters()] {
         for laplacian in [Laplacian::Biggs, Laplacian::Cotangent] {
-            let p = Parameters { laplacian, ..small() };
+            let p = Parameters { basis: laplacian, ..small() };
             for patch in Patches::new(&Map::of_points(&table, METRES), &p).unwrap().as_slice() {
                 assert!(largest_difference(patch, 129) < 1e-6, "{laplacian:?}");
             }

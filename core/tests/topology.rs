@@ -178,7 +178,7 @@ proptest! {
     #[test]
     fn nothing_crosses_that_did_not_and_junctions_hold(sketch in towns(), shape in shapes(), laplacian in laplacians()) {
         let town = sketch.survey();
-        let marked = town.mark(&Parameters { shape, laplacian, ..parameters() });
+        let marked = town.mark(&Parameters { shape, basis: laplacian, ..parameters() });
         prop_assert_eq!(crossings(&town.segments, town.coords()), crossings(&town.segments, &marked.coords));
         for &[a, b] in &town.segments {
             let [a, b] = [a as usize, b as usize];
@@ -257,7 +257,7 @@ fn the_same_for_any_number_of_threads() {
 #[test]
 fn on_a_grid_junctions_hold_within_a_step() {
     let town = small_town().survey();
-    let marked = town.mark(&Parameters { precision: Some(0.001), ..parameters() });
+    let marked = town.mark(&Parameters { precision_crs_units: Some(0.001), ..parameters() });
     for &[a, b] in &town.segments {
         let [a, b] = [a as usize, b as usize];
         for v in (0..town.coords().len()).filter(|v| *v != a && *v != b) {

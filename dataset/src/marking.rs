@@ -211,7 +211,7 @@ impl<'a> Unmarked<'a> {
         let get_after = |number| Cow::Owned(self.geometries.outline(number, &marked.coords));
         let [before, after] = [outlines(self.geometries, &get_before), outlines(self.geometries, &get_after)];
         let state = State::measure(after);
-        let grid = parameters.precision.unwrap_or(0.0);
+        let grid = parameters.precision_crs_units.unwrap_or(0.0);
         let comparison = BeforeAfter {
             before: (before, &self.state),
             after: (after, &state),
@@ -246,7 +246,6 @@ pub fn record(
     reference: Reference,
     distortion: Distortion,
 ) -> Record {
-    let parameters = &options.parameters;
     let Distortion { displacement, angles, areas, hausdorff, validity, overlaps, topology } = distortion;
     Record {
         meshmark_record: record::VERSION,
@@ -255,14 +254,7 @@ pub fn record(
         recipient: subject.recipient().map(String::from),
         message: subject.message(key).to_hex(),
         whitened: matches!(subject, Subject::Message(_)),
-        amplitude_m: parameters.amplitude_m,
-        code: parameters.code,
-        chip_rate: parameters.chip_rate,
-        patch_size: parameters.patch_size,
-        tolerance_m: parameters.tolerance_m,
-        shape: parameters.shape,
-        basis: parameters.laplacian,
-        precision_crs_units: parameters.precision,
+        parameters: options.parameters.clone(),
         layers: options.layers.clone(),
         srs: options.srs.clone(),
         reference,

@@ -65,13 +65,13 @@ fn the_message_can_be_read_from_what_ogr2ogr_wrote() {
 
     let reference = survey_of(&fixture("kotka.gpkg"));
     let (table, ground) = (&reference.data.vertices, reference.ground().unwrap());
-    let patches = Patches::new(&reference.map().unwrap(), &record.parameters().unwrap()).unwrap();
+    let patches = Patches::new(&reference.map().unwrap(), &record.parameters).unwrap();
     let mut observed = vec![None; table.len()];
     for (from, to) in moves {
         observed[table.index_of(from).unwrap()] = Some(ground.metres_between(from, to));
     }
     let message = record.message().unwrap();
-    let parameters = record.parameters().unwrap();
+    let parameters = record.parameters;
     let carrier = Carrier::new(&host.key());
     let found =
         demodulation::paper(&patches, &carrier, &observed, message.len(), &parameters, &|_| ()).unwrap();
@@ -99,8 +99,8 @@ fn the_record_says_what_was_done_and_keeps_the_secret() {
     assert_eq!(record.reference.vertices, table.len());
     assert_eq!(record.reference.vertices_sha256, table.digest());
     assert_eq!(record.reference.crs.as_deref(), Some("EPSG:3067"));
-    assert_eq!((record.amplitude_m, record.patch_size), (0.2, 480));
-    assert_eq!((record.code, record.chip_rate), (Code::Ldpc, 1));
+    assert_eq!((record.parameters.amplitude_m, record.parameters.patch_size), (0.2, 480));
+    assert_eq!((record.parameters.code, record.parameters.chip_rate), (Code::Ldpc, 1));
     assert_eq!(record.recipient.as_deref(), Some("ACME GmbH"));
     assert_eq!(record.message, host.key().recipient_message("ACME GmbH").to_hex());
     assert_eq!(record.key_id, host.key().id());
@@ -132,7 +132,7 @@ fn a_message_instead_of_a_recipient_is_recorded_as_it_is() {
     host.run("ogr2ogr", &arguments).succeeds();
     let record = Record::from_json(&fs::read_to_string(host.path("record.json")).unwrap()).unwrap();
     assert_eq!((record.message.as_str(), record.recipient), ("c0ffee11", None));
-    assert_eq!((record.code, record.chip_rate), (Code::Repetition, 2));
+    assert_eq!((record.parameters.code, record.parameters.chip_rate), (Code::Repetition, 2));
 }
 
 #[test]

@@ -32,7 +32,7 @@ fn the_record_tells_of_this_marking() {
     assert_eq!(record.key_id, vectors::key().id());
     assert_eq!(record.recipient.as_deref(), Some(vectors::RECIPIENT));
     assert_eq!(record.message().unwrap(), MARKING.message);
-    assert_eq!(record.parameters().unwrap(), MARKING.parameters);
+    assert_eq!(record.parameters, MARKING.parameters);
     assert_eq!(record.reference.vertices, MARKING.reference.len());
     assert_eq!(record.reference.patches, MARKING.marked.patches);
     assert_eq!(record.reference.vertices_sha256, MARKING.reference.digest());

@@ -99,7 +99,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         record: None,
         subject: None,
         bits: 128,
-        parameters: Parameters { precision: Some(PRECISION_M), ..Parameters::default() },
+        parameters: Parameters { precision_crs_units: Some(PRECISION_M), ..Parameters::default() },
         layers: None,
         srs: None,
         landmarks: Vec::new(),

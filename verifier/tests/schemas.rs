@@ -3,7 +3,7 @@
 use meshmark_core::{
     code::Code,
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
-    options::{Kind, Laplacian, OPTIONS, Rigidity},
+    options::{Kind, OPTIONS, Parameters},
     record::{Record, Reference, TopologyEntry},
 };
 use serde_json::{Value, json};
@@ -77,14 +77,7 @@ fn record() -> Record {
         recipient: None,
         message: "095abfcd9510d386660bcc7d0e7b8760".into(),
         whitened: false,
-        amplitude_m: 0.1,
-        code: Code::Repetition,
-        chip_rate: 2,
-        patch_size: 480,
-        tolerance_m: 0.75,
-        shape: Rigidity::Free,
-        basis: Laplacian::Biggs,
-        precision_crs_units: None,
+        parameters: Parameters { chip_rate: 2, code: Code::Repetition, ..Parameters::default() },
         layers: None,
         srs: None,
         reference: Reference { vertices: 3833, patches: 7, vertices_sha256: "0f".repeat(32), crs: None },
@@ -110,7 +103,7 @@ fn records_are_valid_with_every_field_given_and_with_none() {
     assert_valid("record", &json_of(&record()));
     let full = Record {
         recipient: Some("ACME GmbH".into()),
-        precision_crs_units: Some(0.01),
+        parameters: Parameters { precision_crs_units: Some(0.01), ..Parameters::default() },
         layers: Some(vec!["buildings".into(), "roads".into()]),
         srs: Some("EPSG:3067".into()),
         reference: Reference { crs: Some("EPSG:3067".into()), ..record().reference },

@@ -1,66 +1,26 @@
 //! The watermark options: one table defines the driver's option list, the parser, the flags of the command
 //! line and the table in the docs.
 
+mod creation;
 mod list;
 mod listing;
 mod parameters;
+mod subject;
 mod table;
+mod values;
 
+pub use creation::Creation;
 pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
 pub use parameters::{Code, Laplacian, Parameters, Rigidity};
 pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
+pub use subject::Subject;
 pub use table::{
     CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
 };
 
-use crate::{Error, Result, key::SecretKey, message::Message, whitening::whiten};
-
-/// The content of a mark: a name, or the bits themselves.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Subject {
-    /// The message is a keyed hash of this text.
-    Recipient(String),
-    /// The message, which the key whitens before it is coded.
-    Message(Message),
-    /// The message of a mark made before whitening existed: its own bits are coded.
-    Unwhitened(Message),
-}
-
-impl Subject {
-    /// Returns the bits that the code carries under a key.
-    pub fn carried(&self, key: &SecretKey) -> Message {
-        match self {
-            Subject::Recipient(text) => key.recipient_message(text),
-            Subject::Message(message) => whiten(key, message),
-            Subject::Unwhitened(message) => message.clone(),
-        }
-    }
-
-    /// Returns the message of records and reports for the bits that the code carries.
-    pub fn message_of(&self, carried: &Message, key: &SecretKey) -> Message {
-        match self {
-            Subject::Message(_) => key.unwhitened(carried),
-            Subject::Recipient(_) | Subject::Unwhitened(_) => carried.clone(),
-        }
-    }
-
-    /// Returns the message of records and reports.
-    pub fn message(&self, key: &SecretKey) -> Message {
-        match self {
-            Subject::Recipient(text) => key.recipient_message(text),
-            Subject::Message(message) | Subject::Unwhitened(message) => message.clone(),
-        }
-    }
-
-    /// Returns the recipient, when the message is made from one.
-    pub fn recipient(&self) -> Option<&str> {
-        match self {
-            Subject::Recipient(text) => Some(text),
-            Subject::Message(_) | Subject::Unwhitened(_) => None,
-        }
-    }
-}
+use crate::{Result, message::Message};
+use values::Values;
 
 /// All options of one marking, parsed.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +48,6 @@ impl Options {
     /// and MESSAGE, and bad hexadecimal digits.
     pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
         let values = Values::collect(OPTIONS, pairs)?;
-        let precision = values.number("PRECISION")?;
         let subject = values.subject()?;
         let bits = match &subject {
             Some(Subject::Message(message)) => message.len(),
@@ -106,13 +65,48 @@ impl Options {
                 patch_size: values.integer("PATCH_SIZE")?.expect("has a default"),
                 tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
                 shape: values.choice("SHAPE", Rigidity::from_name)?.expect("has a default"),
-                laplacian: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
-                precision,
+                basis: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
+                precision_crs_units: values.number("PRECISION")?,
             },
             layers: values.list("LAYERS")?,
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
         })
+    }
+
+    /// Returns the value of an option in its one canonical spelling, which parses to it: equal texts are equal
+    /// values. `None` where the option is not given.
+    ///
+    /// # Panics
+    /// Panics when `option` is no row of [`OPTIONS`].
+    pub fn text_of(&self, option: &str) -> Option<String> {
+        let p = &self.parameters;
+        match option {
+            "KEY" => self.key_path.clone(),
+            "RECIPIENT" => self.subject.as_ref()?.recipient().map(String::from),
+            "MESSAGE" => self.subject.as_ref()?.given_message().map(Message::to_hex),
+            "AMPLITUDE" => Some(p.amplitude_m.to_string()),
+            "CODE" => Some(p.code.name()),
+            "CHIP_RATE" => Some(p.chip_rate.to_string()),
+            "PATCH_SIZE" => Some(p.patch_size.to_string()),
+            "TOLERANCE" => Some(p.tolerance_m.to_string()),
+            "PRECISION" => p.precision_crs_units.map(|precision| precision.to_string()),
+            "LAYERS" => self.layers.as_ref().map(join_list),
+            "SHAPE" => Some(p.shape.name().into()),
+            "BASIS" => Some(p.basis.name().into()),
+            "SRS" => self.srs.clone(),
+            "RECORD" => self.record_path.clone(),
+            _ => panic!("{option} is no option"),
+        }
+    }
+
+    /// Checks values that do not come from [`Options::parse`].
+    ///
+    /// # Errors
+    /// Those of [`Options::parse`].
+    pub fn check(&self) -> Result<()> {
+        let texts: Vec<_> = OPTIONS.iter().filter_map(|o| Some((o.name, self.text_of(o.name)?))).collect();
+        Options::parse(texts.iter().map(|(name, text)| (*name, text.as_str()))).map(|_| ())
     }
 }
 
@@ -123,123 +117,10 @@ impl Default for Parameters {
     }
 }
 
-/// The given pairs, each name known and given once.
-struct Values<'a>(Vec<(&'static OptionSpec, &'a str)>);
-
-impl<'a> Values<'a> {
-    fn collect(
-        options: &'static [OptionSpec],
-        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
-    ) -> Result<Self> {
-        let mut values: Vec<(&OptionSpec, &str)> = Vec::new();
-        for (name, value) in pairs {
-            let Some(spec) = options.iter().find(|o| o.name.eq_ignore_ascii_case(name)) else {
-                return Err(Error::UnknownOption(name.into()));
-            };
-            if values.iter().any(|(s, _)| s.name == spec.name) {
-                return Err(Error::RepeatedOption(spec.name));
-            }
-            values.push((spec, value));
-        }
-        Ok(Values(values))
-    }
-
-    fn given(&self, name: &str) -> Option<&'a str> {
-        self.0.iter().find(|(spec, _)| spec.name == name).map(|(_, value)| *value)
-    }
-
-    fn text(&self, name: &'static str) -> Result<Option<String>> {
-        match self.given(name) {
-            Some(value) if value.trim().is_empty() => Err(Error::EmptyOption(name)),
-            value => Ok(value.map(String::from)),
-        }
-    }
-
-    fn subject(&self) -> Result<Option<Subject>> {
-        match (self.text("RECIPIENT")?, self.text("MESSAGE")?) {
-            (Some(_), Some(_)) => Err(Error::BothSubjects),
-            (Some(text), None) => Ok(Some(Subject::Recipient(text))),
-            (None, Some(hex)) => Ok(Some(Subject::Message(Message::from_hex(&hex)?))),
-            (None, None) => Ok(None),
-        }
-    }
-
-    fn list(&self, option: &'static str) -> Result<Option<Vec<String>>> {
-        let Some(value) = self.text(option)? else { return Ok(None) };
-        let Some(names) = split_list(&value) else { return Err(Error::Quotes { option, value }) };
-        if names.iter().any(String::is_empty) {
-            return Err(Error::EmptyName { option, value });
-        }
-        Ok(Some(names))
-    }
-
-    fn number(&self, name: &str) -> Result<Option<f64>> {
-        self.parsed(name, |kind, text| {
-            let Kind::Number(above, most) = kind else { unreachable!("{name} is a number") };
-            text.parse().ok().filter(|number| *number > above && *number <= most)
-        })
-    }
-
-    fn integer(&self, name: &str) -> Result<Option<usize>> {
-        self.parsed(name, |kind, text| {
-            let Kind::Integer(least, most) = kind else { unreachable!("{name} is an integer") };
-            text.parse().ok().filter(|number| (least..=most).contains(number))
-        })
-    }
-
-    fn choice<T>(&self, name: &str, from_name: impl Fn(&str) -> Option<T>) -> Result<Option<T>> {
-        self.parsed(name, |_, text| from_name(text))
-    }
-
-    /// Returns the value given, or the default, as `parse` understands it.
-    fn parsed<T>(&self, name: &str, parse: impl Fn(Kind, &str) -> Option<T>) -> Result<Option<T>> {
-        let spec = spec(name).expect("a row of the table");
-        let Some(value) = self.given(name).or(spec.default) else { return Ok(None) };
-        let illegal = || Error::IllegalValue { option: spec.name, value: value.into(), kind: spec.kind };
-        parse(spec.kind, value.trim()).ok_or_else(illegal).map(Some)
-    }
-}
-
-/// Where and how the marked map is written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Creation {
-    /// Path of the unmarked map to write.
-    pub reference_path: String,
-    /// GDAL's short name of the format, when it is not to follow from the file name.
-    pub format: Option<String>,
-    /// Whether a file that exists is replaced.
-    pub overwrite: bool,
-}
-
-impl Creation {
-    /// Parses the rows of [`CREATION_OPTIONS`].
-    ///
-    /// # Errors
-    /// Fails on an unknown name, a name given twice, an illegal value, and a missing REFERENCE.
-    pub fn parse<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
-        let values = Values::collect(CREATION_OPTIONS, pairs)?;
-        let reference_path = values.text("REFERENCE")?.ok_or(Error::NoReference)?;
-        let overwrite = match values.given("OVERWRITE") {
-            None => false,
-            Some(word) if word.eq_ignore_ascii_case("YES") => true,
-            Some(word) if word.eq_ignore_ascii_case("NO") => false,
-            Some(word) => {
-                let kind = Kind::Choice(&["NO", "YES"]);
-                return Err(Error::IllegalValue { option: "OVERWRITE", value: word.into(), kind });
-            }
-        };
-        Ok(Creation { reference_path, format: values.text("FORMAT")?, overwrite })
-    }
-
-    /// Returns whether an option is one of [`CREATION_OPTIONS`].
-    pub fn has(name: &str) -> bool {
-        CREATION_OPTIONS.iter().any(|o| o.name.eq_ignore_ascii_case(name))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Error;
 
     fn error(pairs: &[(&str, &str)]) -> String {
         Options::parse(pairs.iter().copied()).unwrap_err().to_string()
@@ -249,8 +130,8 @@ mod tests {
     fn defaults_are_those_of_the_table() {
         let p = Parameters::default();
         assert_eq!((p.amplitude_m, p.patch_size), (0.10, 480));
-        assert_eq!((p.tolerance_m, p.precision), (0.75, None));
-        assert_eq!((p.shape, p.laplacian), (Rigidity::Free, Laplacian::Biggs));
+        assert_eq!((p.tolerance_m, p.precision_crs_units), (0.75, None));
+        assert_eq!((p.shape, p.basis), (Rigidity::Free, Laplacian::Biggs));
     }
 
     #[test]
@@ -296,12 +177,12 @@ mod tests {
         for subject in [("RECIPIENT", " ACME, \"GmbH\""), ("MESSAGE", "C0ffee")] {
             let given = [&all[..], &[subject]].concat();
             for options in [marking(&given), marking(&[]), marking(&[subject])] {
-                let texts = OPTIONS.iter().filter_map(|o| Some((o.name, o.text_of(&options)?)));
+                let texts = OPTIONS.iter().filter_map(|o| Some((o.name, options.text_of(o.name)?)));
                 let texts: Vec<_> = texts.collect();
                 let pairs = texts.iter().map(|(name, text)| (*name, text.as_str()));
                 assert_eq!(Options::parse(pairs).unwrap(), options, "{texts:?}");
             }
-            let printed = OPTIONS.iter().filter(|o| o.text_of(&marking(&given)).is_some()).count();
+            let printed = OPTIONS.iter().filter(|o| marking(&given).text_of(o.name).is_some()).count();
             assert_eq!(printed, OPTIONS.len() - 1, "all but the other subject");
         }
     }

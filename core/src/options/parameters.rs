@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The numbers that shape a mark; with the key, the message and the reference they determine it.
-#[derive(Debug, Clone, PartialEq)]
+/// The numbers that shape a mark; with the key, the message and the reference they determine it. Records and
+/// reports hold them as they are here.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameters {
     /// α, amplitude per coefficient, metres on the ground.
     pub amplitude_m: f64,
@@ -18,9 +19,9 @@ pub struct Parameters {
     /// Which vertices move as one.
     pub shape: Rigidity,
     /// Which functions carry the mark.
-    pub laplacian: Laplacian,
-    /// Grid of the marked coordinates, CRS units.
-    pub precision: Option<f64>,
+    pub basis: Laplacian,
+    /// Grid of the marked coordinates, CRS units; `None` where it is not rounded.
+    pub precision_crs_units: Option<f64>,
 }
 
 /// How many bits of a message LDPC carries.

@@ -1,6 +1,6 @@
 //! The table of the options and their spelling.
 
-use super::{Code, Laplacian, Options, Rigidity, Subject, join_list};
+use super::parameters::{Code, Laplacian, Rigidity};
 
 /// The smallest and the largest PATCH_SIZE: fewer vertices carry no useful message, more need minutes and
 /// gigabytes for each solution.
@@ -75,16 +75,6 @@ pub struct OptionSpec {
     pub help: &'static str,
     /// Whether it shapes the mark, so that `meshmark verify` needs it when there is no record.
     pub shapes_mark: bool,
-    /// The value of `options` as a text that parses to it; `None` where it is not given.
-    text: fn(options: &Options) -> Option<String>,
-}
-
-impl OptionSpec {
-    /// Returns this option's value among `options` in its one canonical spelling, which parses to it: equal
-    /// texts are equal values.
-    pub fn text_of(&self, options: &Options) -> Option<String> {
-        (self.text)(options)
-    }
 }
 
 const fn row(
@@ -92,20 +82,9 @@ const fn row(
     kind: Kind,
     default: Option<&'static str>,
     shapes_mark: bool,
-    text: fn(&Options) -> Option<String>,
     help: &'static str,
 ) -> OptionSpec {
-    OptionSpec { name, kind, default, help, shapes_mark, text }
-}
-
-/// A row of [`CREATION_OPTIONS`], which have no value among [`Options`].
-const fn creation_row(
-    name: &'static str,
-    kind: Kind,
-    default: Option<&'static str>,
-    help: &'static str,
-) -> OptionSpec {
-    row(name, kind, default, false, |_| None, help)
+    OptionSpec { name, kind, default, help, shapes_mark }
 }
 
 /// All options, in the order of the docs.
@@ -115,7 +94,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         false,
-        |o| o.key_path.clone(),
         "Key file made by `meshmark keygen`; or configuration option MESHMARK_KEY",
     ),
     row(
@@ -123,7 +101,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         true,
-        |o| o.subject.as_ref()?.recipient().map(String::from),
         "Who receives this copy; the message is 128 bits of a keyed hash of this text",
     ),
     row(
@@ -131,10 +108,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         true,
-        |o| match o.subject.as_ref()? {
-            Subject::Recipient(_) => None,
-            Subject::Message(message) | Subject::Unwhitened(message) => Some(message.to_hex()),
-        },
         "The message itself, 2 to 256 hexadecimal digits, instead of a recipient",
     ),
     row(
@@ -142,7 +115,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Number(0.0, 1e6),
         Some("0.10"),
         true,
-        |o| Some(o.parameters.amplitude_m.to_string()),
         "Amplitude of every coefficient, metres on the ground",
     ),
     row(
@@ -150,8 +122,7 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Choice(&Code::NAMES),
         None,
         true,
-        |o| Some(o.parameters.code.name()),
-        "LDPC turns 128 message bits into 256 that correct errors, REPETITION carries any number as they are; by \
+        "LDPC turns 128 message bits into 256 that correct errors, REPETITION repeats any number of bits; by \
          default LDPC for 128 bits, otherwise REPETITION",
     ),
     row(
@@ -159,7 +130,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Integer(1, 2048),
         None,
         true,
-        |o| Some(o.parameters.chip_rate.to_string()),
         "Coefficients that carry each of those bits, per patch and axis; by default 1 with LDPC, 2 with REPETITION",
     ),
     row(
@@ -167,7 +137,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Integer(PATCH_SIZE_RANGE.0, PATCH_SIZE_RANGE.1),
         Some("480"),
         true,
-        |o| Some(o.parameters.patch_size.to_string()),
         "Smallest number of vertices in a patch",
     ),
     row(
@@ -175,7 +144,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Number(0.0, 1e6),
         Some("0.75"),
         true,
-        |o| Some(o.parameters.tolerance_m.to_string()),
         "No vertex moves further than this, metres on the ground",
     ),
     row(
@@ -183,7 +151,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Number(0.0, 1e6),
         None,
         true,
-        |o| o.parameters.precision.map(|precision| precision.to_string()),
         "Grid of the marked coordinates, CRS units; none by default",
     ),
     row(
@@ -191,7 +158,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         true,
-        |o| o.layers.as_ref().map(join_list),
         "Comma-separated layers to mark together, those with a comma in double quotes; the others pass unchanged; all by default",
     ),
     row(
@@ -199,7 +165,6 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Choice(&Rigidity::NAMES),
         Some("FREE"),
         true,
-        |o| Some(o.parameters.shape.name().into()),
         "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them",
     ),
     row(
@@ -207,42 +172,35 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Choice(&Laplacian::NAMES),
         Some("BIGGS"),
         true,
-        |o| Some(o.parameters.laplacian.name().into()),
         "Mesh Laplacian: BIGGS is that of the paper; COTANGENT bends angles less and needs the very same reference",
     ),
-    row(
-        "SRS",
-        Kind::Text,
-        None,
-        true,
-        |o| o.srs.clone(),
-        "CRS of the source when it has none, for example EPSG:3067",
-    ),
+    row("SRS", Kind::Text, None, true, "CRS of the source when it has none, for example EPSG:3067"),
     row(
         "RECORD",
         Kind::Text,
         None,
         false,
-        |o| o.record_path.clone(),
-        "Record file to write: what an auditor needs besides the key and the reference",
+        "Record file to write, which verification needs with the key and the reference",
     ),
 ];
 
 /// The further options of a driver that writes, in the order of the docs.
 pub const CREATION_OPTIONS: &[OptionSpec] = &[
-    creation_row(
+    row(
         "REFERENCE",
         Kind::Text,
         None,
+        false,
         "GeoPackage to write with the unmarked map as it arrived, which verification needs; required",
     ),
-    creation_row(
+    row(
         "FORMAT",
         Kind::Text,
         None,
+        false,
         "Short name of the GDAL driver that writes the marked map; by default the one of the file name extension",
     ),
-    creation_row("OVERWRITE", Kind::Choice(&["NO", "YES"]), Some("NO"), "Replace the file when it exists"),
+    row("OVERWRITE", Kind::Choice(&["NO", "YES"]), Some("NO"), false, "Replace the file when it exists"),
 ];
 
 /// Looks a row up by its name, in any case.

@@ -3,7 +3,7 @@
 use super::arguments::VerifyArgs;
 use meshmark_core::{
     key::RECIPIENT_BITS,
-    options::{self, Options, Spelling},
+    options::{Options, Spelling},
     record::Record,
 };
 use meshmark_verifier::{Error, Request, Result, inputs::texts, verify::check_key};
@@ -18,7 +18,7 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         Some(record) => {
             check_flags(&args.marking.0, record)?;
             check_key(record, &key)?;
-            from_record(record)?
+            record.options()?
         }
         None => options,
     };
@@ -42,30 +42,17 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
     })
 }
 
-/// Returns the options of a record.
-fn from_record(record: &Record) -> Result<Options> {
-    Ok(Options {
-        key_path: None,
-        subject: Some(record.subject()?),
-        parameters: record.parameters()?,
-        layers: record.layers.clone(),
-        srs: record.srs.clone(),
-        record_path: None,
-    })
-}
-
 /// Checks that flags agree with the record, which they may repeat.
 fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> {
-    let recorded = from_record(record)?;
+    let recorded = record.options()?;
     for (name, value) in flags {
         let alone = Options::parse([(*name, value.as_str())])?;
-        let spec = options::spec(name).expect("flags are rows of the table");
         let on_record = match *name {
             // A record has the message of its recipient, too.
             "MESSAGE" => Some(record.message()?.to_hex()),
-            _ => spec.text_of(&recorded),
+            _ => recorded.text_of(name),
         };
-        if spec.text_of(&alone) != on_record {
+        if alone.text_of(name) != on_record {
             let flag = Spelling::Flag.value(name, value);
             return Err(Error::Contradiction { flag });
         }

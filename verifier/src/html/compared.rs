@@ -10,7 +10,11 @@ use crate::{
     words::{clipped, printable},
 };
 use maud::{Markup, html};
-use meshmark_core::{counted, options::join_list};
+use meshmark_core::{
+    code::Code,
+    counted,
+    options::{Parameters, join_list},
+};
 use meshmark_detection::decision::Verdict;
 
 pub fn compared(report: &Report) -> Markup {
@@ -68,27 +72,30 @@ fn record(report: &Report, record: Option<&Digested>) -> Markup {
 /// Renders the assumed parameters of the mark, and those of the test.
 pub fn settings(report: &Report) -> Markup {
     let p = &report.parameters;
+    let Parameters {
+        amplitude_m,
+        code,
+        chip_rate,
+        patch_size,
+        tolerance_m,
+        shape,
+        basis,
+        precision_crs_units,
+    } = &p.mark;
     let text = |text: String| Some(html! { (text) });
     let chips = format!(
         "{}, {} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
-        if p.code == meshmark_core::code::Code::Ldpc {
-            "as an error-correcting code word (LDPC)"
-        } else {
-            "repeated bits"
-        },
-        counted(p.chip_rate, "coefficient"),
-        p.patch_size,
-        word(&p.basis)
+        if *code == Code::Ldpc { "as an error-correcting code word (LDPC)" } else { "repeated bits" },
+        counted(*chip_rate, "coefficient"),
+        patch_size,
+        word(basis)
     );
-    let grid = p.precision_crs_units.map(|grid| html! { (grid) " CRS units" });
+    let grid = precision_crs_units.map(|grid| html! { (grid) " CRS units" });
     let layers = p.layers.as_ref().map(|layers| html! { (printable(&join_list(layers))) });
     let content = table(&[
-        (
-            "Amplitude",
-            text(format!("{} m on the ground, no vertex further than {} m", p.amplitude_m, p.tolerance_m)),
-        ),
+        ("Amplitude", text(format!("{amplitude_m} m on the ground, no vertex further than {tolerance_m} m"))),
         ("Message", text(chips)),
-        ("Shape", text(format!("{} vertices", word(&p.shape)))),
+        ("Shape", text(format!("{} vertices", word(shape)))),
         ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
         ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
         ("Matching radius", text(format!("{} m", p.radius_m))),

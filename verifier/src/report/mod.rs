@@ -17,7 +17,7 @@ pub use report_file::{Format, ReportFile};
 use crate::ExitCode;
 use meshmark_core::{
     code::{Code, Decoder},
-    options::{Laplacian, Rigidity},
+    options::Parameters,
 };
 use meshmark_detection::{
     decision::{Decoys, Null, Verdict},
@@ -123,14 +123,8 @@ pub struct ReportParameters {
     pub key_id: String,
     pub recipient: Option<String>,
     pub expected_message: Option<String>,
-    pub amplitude_m: f64,
-    pub code: Code,
-    pub chip_rate: usize,
-    pub shape: Rigidity,
-    pub basis: Laplacian,
-    pub patch_size: usize,
-    pub tolerance_m: f64,
-    pub precision_crs_units: Option<f64>,
+    #[serde(flatten)]
+    pub mark: Parameters,
     pub layers: Option<Vec<String>>,
     pub crs: Option<String>,
     pub demodulator: &'static str,

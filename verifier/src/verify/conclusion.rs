@@ -73,19 +73,11 @@ pub fn conclude(
 }
 
 fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters {
-    let p = &request.parameters;
     ReportParameters {
         key_id: request.key.id(),
         recipient: request.recipient().map(String::from),
         expected_message: request.subject.as_ref().map(|s| s.message(&request.key).to_hex()),
-        amplitude_m: p.amplitude_m,
-        code: p.code,
-        chip_rate: p.chip_rate,
-        shape: p.shape,
-        basis: p.laplacian,
-        patch_size: p.patch_size,
-        tolerance_m: p.tolerance_m,
-        precision_crs_units: p.precision,
+        mark: request.parameters.clone(),
         layers: request.layers.clone(),
         crs: seen.crs.clone(),
         demodulator: match request.demodulator {

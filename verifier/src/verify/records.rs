@@ -64,7 +64,7 @@ pub fn verify_records(
         Some((_, files)) => files.push(file.into()),
         None => skipped.push((reason, vec![file.into()])),
     };
-    let groups = groups(request, read_all(folder, &request.key, &mut skip)?)?;
+    let groups = groups(request, read_all(folder, &request.key, &mut skip)?);
     let mut examined: Vec<(Request, Examination)> = Vec::new();
     let mut of_group = Vec::new();
     for group in groups {
@@ -133,24 +133,25 @@ fn candidate(file: String, record: Record, key: &SecretKey) -> Result<Candidate>
 }
 
 /// Groups records that differ only in their message.
-fn groups(request: &Request, candidates: Vec<Candidate>) -> Result<Vec<Group>> {
+fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
         let (record, bits) = (&candidate.record, candidate.message.len());
-        let parameters = record.parameters()?;
+        let parameters = &record.parameters;
         let same = |group: &&mut Group| {
             let r = &group.request;
-            r.parameters == parameters && r.layers == record.layers && r.srs == record.srs && r.bits == bits
+            r.parameters == *parameters && r.layers == record.layers && r.srs == record.srs && r.bits == bits
         };
         if let Some(group) = groups.iter_mut().find(same) {
             group.candidates.push(candidate);
             continue;
         }
         let (layers, srs) = (record.layers.clone(), record.srs.clone());
+        let parameters = parameters.clone();
         let request = Request { parameters, layers, srs, bits, ..request.clone() };
         groups.push(Group { request, candidates: vec![candidate] });
     }
-    Ok(groups)
+    groups
 }
 
 /// Demodulates the suspect for one group; returns `None` when none of its records is of this
