@@ -54,6 +54,7 @@ pub mod map;
 pub mod map_data;
 pub mod mesh;
 pub mod message;
+pub mod modulation;
 mod motion;
 mod nearness;
 pub mod noise_law;

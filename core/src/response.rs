@@ -105,6 +105,16 @@ impl Response {
         }
     }
 
+    /// Returns the displacement of every row by coefficients of either axis, metres.
+    pub fn synthesise(&self, coefficients: &[Vec<f64>; 2]) -> Vec<[f64; 2]> {
+        let [cx, cy] = coefficients.each_ref().map(|values| faer::ColRef::from_slice(values));
+        let [x, y] = match self {
+            Response::Separate(block) => [block * cx, block * cy],
+            Response::Coupled([[xx, xy], [yx, yy]]) => [xx * cx + xy * cy, yx * cx + yy * cy],
+        };
+        x.iter().zip(y.iter()).map(|(x, y)| [*x, *y]).collect()
+    }
+
     /// Returns the products of the columns of either axis with displacements (n × 2).
     pub fn correlations(&self, moved: &Mat<f64>) -> [Vec<f64>; 2] {
         let (x, y) = (moved.col(0), moved.col(1));

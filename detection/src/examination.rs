@@ -4,7 +4,7 @@
 
 use crate::{
     decision::Decoys,
-    matching::{Matcher, Matches, is_chance, out_of_place},
+    matching::{Matcher, Matches, Radius, RadiusChoice, is_chance, out_of_place},
     progress::{Listener, Progress},
     registration::Registration,
     tracking::{Followed, Tracking},
@@ -74,6 +74,8 @@ pub struct Matched<'a> {
     pub suspect: &'a MapData,
     /// Vertices of the suspect after registration, CRS units of the reference.
     pub moved: Vec<[f64; 2]>,
+    /// The matching radius.
+    pub radius: Radius,
     /// The matches of the vertices.
     pub matches: Matches,
     /// Number of vertices that match after the suspect is shifted out of place.
@@ -81,21 +83,32 @@ pub struct Matched<'a> {
 }
 
 impl<'a> Matched<'a> {
-    /// Matches the vertices of a registered suspect within `radius_m`, metres.
+    /// Matches the vertices of a registered suspect.
     pub fn new(
         reference: &'a Reference<'a>,
         suspect: &'a MapData,
         registration: &Registration,
-        radius_m: f64,
+        radius: RadiusChoice,
+    ) -> Self {
+        Self::of_moved(reference, suspect, registration.apply(suspect.vertices.coords()), radius)
+    }
+
+    /// Matches the vertices of a suspect at these places, CRS units of the reference.
+    pub(crate) fn of_moved(
+        reference: &'a Reference<'a>,
+        suspect: &'a MapData,
+        moved: Vec<[f64; 2]>,
+        radius: RadiusChoice,
     ) -> Self {
         let (ground, vertices) = (&reference.ground, &reference.data.vertices);
-        let moved = registration.apply(suspect.vertices.coords());
+        let unit_m = ground.metres_per_unit(vertices.centre());
         let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
-        let matches = matcher.all(&moved, radius_m);
-        let [x, y] = out_of_place(ground.metres_per_unit(vertices.centre()), radius_m);
+        let radius = radius.choose(&matcher, &moved, unit_m);
+        let matches = matcher.all(&moved, radius.metres);
+        let [x, y] = out_of_place(unit_m, radius.metres);
         let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
-        let by_chance = matcher.all(&shifted, radius_m).count;
-        Matched { reference, suspect, moved, matches, by_chance }
+        let by_chance = matcher.all(&shifted, radius.metres).count;
+        Matched { reference, suspect, moved, radius, matches, by_chance }
     }
 
     /// Returns whether no more vertices match than by chance; demodulation is impossible then.
@@ -112,7 +125,6 @@ impl<'a> Matched<'a> {
         &self,
         mark: Mark,
         demodulator: Demodulator,
-        radius_m: f64,
         listener: Listener,
     ) -> Result<Demodulated> {
         let Mark { key, bits, parameters } = mark;
@@ -131,7 +143,7 @@ impl<'a> Matched<'a> {
         let maps = (self.reference.data, self.suspect);
         let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
         let Followed { matches, observed, disturbance } =
-            tracking.follow(self.reference.carriers, parameters, radius_m)?;
+            tracking.follow(self.reference.carriers, parameters, self.radius.metres)?;
         listener(Progress::Stage { stage, steps });
         let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
         Ok(self.demodulated(found, matches, Some(disturbance.deformation), disturbance.weights))

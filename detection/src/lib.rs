@@ -13,6 +13,7 @@
 //! | Which vertex is which, and within which radius? | [`matching`] |
 //! | What moved the vertices besides the mark? | `tracking.rs`, and `deformation` of `meshmark-core` |
 //! | What evidence do the displacements give under a key? | [`Matched::demodulate`] |
+//! | Would a mark show on this suspect? | [`power`] |
 //! | Match, no match, or inconclusive, at what p-value? | [`decision`] |
 //!
 //! The example marks a synthetic town for a recipient, shifts it, and recognises the copy of that
@@ -20,7 +21,7 @@
 //!
 //! ```
 //! use meshmark_core::{embedding, ground::Ground, key::SecretKey, map_data::{ChainKind, MapData}, options::*};
-//! use meshmark_detection::{Demodulator, Mark, Matched, Reference, decision::*, registration::*};
+//! use meshmark_detection::{*, decision::*, matching::RadiusChoice, power::Power, registration::*};
 //! # fn main() -> Result<(), meshmark_core::Error> {
 //! // 400 houses of four corners, 20 m apart; the last corner of a ring is the first one.
 //! let corner = |i: usize| [[0, 0], [9, 0], [9, 7], [0, 7], [0, 0]][i % 5].map(|metres| metres as f64);
@@ -37,10 +38,11 @@
 //!
 //! let reference = Reference::new(&town, &map, 128, &parameters)?;
 //! let registration = Registrar::new(&town, &reference.ground, 1.0).register(&suspect, Start::Auto);
-//! let matched = Matched::new(&reference, &suspect, &registration, 1.0);
+//! let matched = Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData);
 //! let mark = Mark { key: &key, bits: 128, parameters: &parameters };
-//! let found = matched.demodulate(mark, Demodulator::Joint, 1.0, &|_| ())?.found;
-//! let decision = decide_among(&found, &Expected::new(&recipient, &key), 1, 1e-6);
+//! let found = matched.demodulate(mark, Demodulator::Joint, &|_| ())?;
+//! let power = Power::measure(&matched, &found, mark, Demodulator::Joint, &|_| ())?;
+//! let decision = decide_among(&found.found, power, &Expected::new(&recipient, &key), 1, 1e-6);
 //! assert_eq!(decision.verdict, Verdict::Match);
 //! # Ok(()) }
 //! ```
@@ -51,6 +53,7 @@ pub mod decision;
 mod examination;
 mod histogram;
 pub mod matching;
+pub mod power;
 mod progress;
 pub mod registration;
 mod tracking;

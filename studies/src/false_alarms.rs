@@ -13,6 +13,8 @@ use meshmark_core::{
 use meshmark_detection::{
     Demodulator,
     decision::{Decision, Expected, Null, decide_among},
+    matching::RadiusChoice,
+    power::Power,
     registration::Start,
 };
 use meshmark_host_tests::{
@@ -105,7 +107,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         landmarks: Vec::new(),
         registration: Start::Auto,
         demodulator: Demodulator::Joint,
-        radius_m: 1.0,
+        radius: RadiusChoice::FromData,
         significance: 1e-6,
         sketch: false,
         evidence_map: false,
@@ -116,7 +118,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
 }
 
 fn decide(found: &Demodulation, carried: Message) -> Decision {
-    decide_among(found, &Expected { carried, null: Null::RandomMessage }, 1, 1e-6)
+    decide_among(found, Power::KeyShows, &Expected { carried, null: Null::RandomMessage }, 1, 1e-6)
 }
 
 /// log₁₀ of p_mark of another key and its message for the recipient.

@@ -13,12 +13,15 @@
 //! hypothesis covers every other message, see [`Null`]. The p-value of the decision is the largest
 //! one.
 
+mod absence;
 mod decoys;
 mod rivals;
 mod survival;
 
 pub use decoys::Decoys;
 
+use crate::power::Power;
+use absence::Unmatched;
 use meshmark_core::{
     demodulation::Demodulation,
     key::SecretKey,
@@ -58,10 +61,6 @@ impl Expected {
     }
 }
 
-/// The margin of power, standard deviations. The verdict is "no match" only where the expected
-/// score of a mark exceeds the significance threshold by this much.
-const POWER_MARGIN: f64 = 3.0;
-
 /// The share of the largest possible recipient score, √n for n channel bits, that remains with
 /// unequal weights.
 const MOST_OF_ROOT: f64 = 0.99;
@@ -92,6 +91,9 @@ pub struct Decision {
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the probability of this much agreement under the null hypothesis about the message.
     pub p_recipient_log10: Option<f64>,
+    /// log₁₀ of the probability that the test misses a mark which the suspect carries; `None` for a match, and
+    /// where it is unknown.
+    pub p_missed_log10: Option<f64>,
     /// Number of messages that were tried.
     pub tried: usize,
 }
@@ -113,12 +115,27 @@ impl Decision {
     /// Returns an inconclusive decision for a reason found before demodulation.
     pub fn inconclusive(reason: String) -> Self {
         let (p_mark_log10, p_recipient_log10) = (None, None);
-        Decision { verdict: Verdict::Inconclusive, reason, p_mark_log10, p_recipient_log10, tried: 1 }
+        let p_missed_log10 = None;
+        Decision {
+            verdict: Verdict::Inconclusive,
+            reason,
+            p_mark_log10,
+            p_recipient_log10,
+            p_missed_log10,
+            tried: 1,
+        }
     }
 }
 
-/// Decides whether a demodulation matches the expected message, one of the `tried` messages.
-pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, significance: f64) -> Decision {
+/// Decides whether a demodulation matches the expected message, one of the `tried` messages; `power` is what a
+/// present mark would show on the suspect.
+pub fn decide_among(
+    found: &Demodulation,
+    power: Power,
+    expected: &Expected,
+    tried: usize,
+    significance: f64,
+) -> Decision {
     let message = &expected.carried;
     let each = significance / tried as f64; // Bonferroni
     let bits = message.len();
@@ -137,6 +154,7 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
     let p_recipient = among_rivals.map_or(p_random, |standing| p_random.max(standing.p_log10));
     let is_mixed = among_rivals.is_some_and(|standing| standing.is_mixed);
     let fits = |p_message: f64| p_mark.max(p_message) < each.log10();
+    let mut p_missed_log10 = None;
     let (verdict, reason) = if bits < LEAST_IDENTIFYING_BITS {
         let reason = format!(
             "a message of {bits} bits cannot identify anyone: mark with {LEAST_IDENTIFYING_BITS} or more"
@@ -162,9 +180,20 @@ pub fn decide_among(found: &Demodulation, expected: &Expected, tried: usize, sig
     } else if fits(p_random) {
         another_message(found, each)
     } else {
-        unseen(found, bits, each)
+        let alone = p_mark.max(p_recipient);
+        let p_log10 = [alone, alone + (tried as f64).log10()];
+        let absence = Unmatched { found, power, bits, each, p_log10 }.decide();
+        p_missed_log10 = absence.p_missed_log10;
+        (absence.verdict, absence.reason)
     };
-    Decision { verdict, reason, p_mark_log10: Some(p_mark), p_recipient_log10: Some(p_recipient), tried }
+    Decision {
+        verdict,
+        reason,
+        p_mark_log10: Some(p_mark),
+        p_recipient_log10: Some(p_recipient),
+        p_missed_log10,
+        tried,
+    }
 }
 
 /// Decides for a suspect that carries a mark of the key while another message explains it as well
@@ -195,35 +224,13 @@ pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64
     (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
 }
 
-/// Decides for a suspect without a visible mark. The verdict is "no match" where a mark of full
-/// amplitude is expected to pass both tests, that of the key with a margin.
-fn unseen(found: &Demodulation, bits: usize, each: f64) -> (Verdict, String) {
-    let needed = (-2.0 * each.ln()).sqrt(); // this bounds the normal quantile from above
-    if (found.estimate.len() as f64).sqrt() <= needed {
-        let reason = format!(
-            "a message of {bits} bits is too short for its absence to show at a significance of {each:.1e}: give \
-             a larger one, or mark with {} bits or more",
-            (needed * needed) as usize + 1
-        );
-        return (Verdict::Inconclusive, reason);
-    }
-    // With the mark present, b̂ is near ±1 on the channel bits that the suspect determines.
-    let known: f64 = found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum();
-    // In the unchanged reference no vertex moves, so there is no noise to compare a mark with.
-    let nothing_moved = found.expected_sum > 0.0 && found.chip_correlations.iter().all(|a| *a == 0.0);
-    let visible = nothing_moved || found.expected_mark_score() > needed + POWER_MARGIN;
-    match visible && known.sqrt() > needed {
-        true => (Verdict::NoMatch, format!("{MARK} would have shown, and it does not")),
-        false => {
-            (Verdict::Inconclusive, format!("too few vertices match, or too roughly, for {MARK} to show"))
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use meshmark_core::code::Code;
+
+    /// A mark shows with fifty standard deviations.
+    const TRIAL: Power = Power::Trial(50.0);
 
     fn random(message: &Message) -> Expected {
         Expected { carried: message.clone(), null: Null::RandomMessage }
@@ -247,24 +254,24 @@ mod tests {
         let other = Message::from_hex("5a5a5a5a0f0f0f0f3c3c3c3c12345678").unwrap();
         let scores: Vec<f64> = message.signs().iter().map(|b| 40.0 * b).collect();
         let found = evidence(message.signs(), scores);
-        let right = decide_among(&found, &random(&message), 1, 1e-6);
+        let right = decide_among(&found, TRIAL, &random(&message), 1, 1e-6);
         assert_eq!(right.verdict, Verdict::Match);
         assert!(right.p_recipient_log10.unwrap() >= -38.6, "not below 2^-128");
-        assert_eq!(decide_among(&found, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
+        assert_eq!(decide_among(&found, TRIAL, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
     }
 
     #[test]
     fn a_short_message_is_inconclusive() {
         let message = Message::from_hex("a5").unwrap();
         let found = evidence(message.signs(), message.signs().iter().map(|b| 1e4 * b).collect());
-        assert_eq!(decide_among(&found, &random(&message), 1, 0.1).verdict, Verdict::Inconclusive);
+        assert_eq!(decide_among(&found, TRIAL, &random(&message), 1, 0.1).verdict, Verdict::Inconclusive);
     }
 
     #[test]
     fn a_significance_that_no_message_of_these_bits_reaches_is_inconclusive_and_says_so() {
         let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
         let found = evidence(message.signs(), message.signs().iter().map(|b| 40.0 * b).collect());
-        let asked = decide_among(&found, &random(&message), 1, 1e-60);
+        let asked = decide_among(&found, TRIAL, &random(&message), 1, 1e-60);
         assert_eq!(asked.verdict, Verdict::Inconclusive);
         assert!(
             asked.reason.contains("a p-value below 10^-28.7") && asked.reason.contains("1.0e-60"),
@@ -273,8 +280,8 @@ mod tests {
         );
         let short = Message::from_hex("0a1b2c").unwrap();
         let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
-        assert_eq!(decide_among(&found, &random(&short), 1, 1e-6).verdict, Verdict::Match);
-        let among = decide_among(&found, &random(&short), 17, 1e-6);
+        assert_eq!(decide_among(&found, TRIAL, &random(&short), 1, 1e-6).verdict, Verdict::Match);
+        let among = decide_among(&found, TRIAL, &random(&short), 17, 1e-6);
         assert!(among.reason.contains("for each of 17 that were tried"), "{}", among.reason);
     }
 
@@ -282,14 +289,14 @@ mod tests {
     fn a_message_too_short_to_be_absent_is_inconclusive_and_says_so() {
         let (short, other) = (Message::from_hex("0a1b2c").unwrap(), Message::from_hex("f5e4d3").unwrap());
         let found = evidence(short.signs(), short.signs().iter().map(|b| 400.0 * b).collect());
-        let decision = decide_among(&found, &random(&other), 1, 1e-6);
+        let decision = decide_among(&found, TRIAL, &random(&other), 1, 1e-6);
         assert_eq!(decision.verdict, Verdict::Inconclusive);
         assert!(
             decision.reason.contains("24 bits is too short") && decision.reason.contains("28 bits or more")
         );
         let [long, other] = ["0a1b2c3d", "f5e4d3c2"].map(|hex| Message::from_hex(hex).unwrap());
         let found = evidence(long.signs(), long.signs().iter().map(|b| 400.0 * b).collect());
-        assert_eq!(decide_among(&found, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
+        assert_eq!(decide_among(&found, TRIAL, &random(&other), 1, 1e-6).verdict, Verdict::NoMatch);
     }
 
     #[test]
@@ -297,11 +304,11 @@ mod tests {
         let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
         let scores: Vec<f64> = message.signs().iter().map(|b| 4.5 * b).collect(); // 5.76 deviations
         let found = evidence(message.signs(), scores);
-        let alone = decide_among(&found, &random(&message), 1, 1e-6);
-        let among = decide_among(&found, &random(&message), 1000, 1e-6);
+        let alone = decide_among(&found, TRIAL, &random(&message), 1, 1e-6);
+        let among = decide_among(&found, TRIAL, &random(&message), 1000, 1e-6);
         assert!((alone.p_value_log10().unwrap() + 3.0 - among.p_value_log10().unwrap()).abs() < 1e-12);
         assert_eq!((alone.verdict, among.verdict), (Verdict::Match, Verdict::NoMatch));
-        assert_eq!(decide_among(&found, &random(&message), 1 << 60, 0.5).p_value_log10(), Some(0.0));
+        assert_eq!(decide_among(&found, TRIAL, &random(&message), 1 << 60, 0.5).p_value_log10(), Some(0.0));
     }
 
     #[test]
@@ -309,14 +316,20 @@ mod tests {
         let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
         let untouched =
             Demodulation { chip_correlations: vec![0.0; 512], ..evidence(vec![0.0; 128], vec![0.0; 128]) };
-        assert_eq!(decide_among(&untouched, &random(&message), 1, 1e-6).verdict, Verdict::NoMatch);
+        assert_eq!(
+            decide_among(&untouched, Power::Unmoved, &random(&message), 1, 1e-6).verdict,
+            Verdict::NoMatch
+        );
     }
 
     #[test]
     fn a_suspect_in_which_a_mark_could_not_show_is_inconclusive() {
         let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
         let weak = Demodulation { expected_sum: 200.0, ..evidence(vec![0.01; 128], vec![0.1; 128]) };
-        assert_eq!(decide_among(&weak, &random(&message), 1, 1e-6).verdict, Verdict::Inconclusive);
+        assert_eq!(
+            decide_among(&weak, Power::Trial(6.0), &random(&message), 1, 1e-6).verdict,
+            Verdict::Inconclusive
+        );
     }
 
     #[test]
@@ -324,7 +337,7 @@ mod tests {
         let [one, two] = [1, 2].map(|n| Message::from_hex(&format!("{n:032x}")).unwrap());
         let found = evidence(one.signs(), one.signs().iter().map(|b| 40.0 * b).collect());
         let of = |message: &Message, null| {
-            decide_among(&found, &Expected { carried: message.clone(), null }, 1, 1e-6)
+            decide_among(&found, TRIAL, &Expected { carried: message.clone(), null }, 1, 1e-6)
         };
         assert_eq!(of(&one, Null::AnyOtherMessage).verdict, Verdict::Match);
         let neighbour = of(&two, Null::AnyOtherMessage);

@@ -19,6 +19,16 @@ pub fn normal_log10(score: f64) -> f64 {
     ln / LN_10
 }
 
+/// Returns the score that a standard normal variable exceeds with probability `p`, for p from 10⁻³⁰⁰ to ½.
+pub fn normal_quantile(p: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if normal_log10(middle) > p.log10() { low = middle } else { high = middle }
+    }
+    high
+}
+
 /// Returns log₁₀ of the probability that a chi-squared variable with `degrees` degrees of freedom
 /// exceeds `score`.
 pub fn chi_squared_log10(score: f64, degrees: usize) -> f64 {
@@ -60,6 +70,9 @@ mod tests {
     fn the_normal_one_has_its_tabled_values_and_no_infinities() {
         for (score, p) in [(0.0, 0.5), (1.0, 0.158_655_25), (5.0, 2.866_516e-7), (-2.0, 0.977_249_87)] {
             assert!((normal_log10(score) - f64::log10(p)).abs() < 1e-6, "{score}");
+        }
+        for score in [0.5, 4.75, 12.0] {
+            assert!((normal_quantile(10f64.powf(normal_log10(score))) - score).abs() < 1e-6, "{score}");
         }
         // The function is continuous where the formula changes, and finite in the far tail.
         assert!((normal_log10(29.999_999_9) - normal_log10(30.0)).abs() < 1e-4);

@@ -62,6 +62,17 @@ impl<'a> Matcher<'a> {
         joined::choose(nearest, &candidates, graphs[0], graphs[1])
     }
 
+    /// Returns the number of reference vertices.
+    pub fn len(&self) -> usize {
+        self.reference.len()
+    }
+
+    /// Returns the distance of every match, metres.
+    pub fn distances_m(&self, suspect: &[[f64; 2]], matches: &Matches) -> Vec<f64> {
+        let displacements = matches.displacements_m(self.reference, suspect, self.ground);
+        displacements.into_iter().flatten().map(|[x, y]| x.hypot(y)).collect()
+    }
+
     fn mutual(&self, step: usize, suspect: &[[f64; 2]], tree: &RTree<Node>, radius_m: f64) -> Matches {
         let mutual = |i: usize| {
             if !i.is_multiple_of(step) {

@@ -4,8 +4,10 @@ mod chance;
 mod joined;
 mod matcher;
 mod matches;
+mod radius;
 
 pub use chance::{LEAST_MATCHED, is_chance, out_of_place};
 pub use joined::Graph;
 pub use matcher::Matcher;
 pub use matches::Matches;
+pub use radius::{Radius, RadiusChoice, RadiusReason};

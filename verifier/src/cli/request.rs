@@ -6,6 +6,7 @@ use meshmark_core::{
     options::{Options, Spelling},
     record::Record,
 };
+use meshmark_detection::matching::RadiusChoice;
 use meshmark_verifier::{Error, Request, Result, inputs::texts, verify::check_key};
 
 /// Combines key, record and flags.
@@ -35,7 +36,7 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         landmarks: args.landmark,
         registration: args.registration.into(),
         demodulator: args.demodulator.into(),
-        radius_m: args.radius,
+        radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
         significance: args.significance,
         sketch: args.report.is_some(),
         evidence_map: args.evidence_map.is_some(),

@@ -21,6 +21,7 @@ use meshmark_core::{
 };
 use meshmark_detection::{
     decision::{Decoys, Null, Verdict},
+    matching::RadiusReason,
     registration::Registration,
 };
 use serde::Serialize;
@@ -54,6 +55,9 @@ pub struct Report {
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the p-value of this much agreement under `null_hypothesis`.
     pub p_recipient_log10: Option<f64>,
+    /// log₁₀ of the probability that this test misses a mark which the suspect carries; null for a match, where it
+    /// is unknown, and where it is 0.
+    pub p_missed_log10: Option<f64>,
     /// The content of a copy with another message; null when no message was expected.
     pub null_hypothesis: Option<Null>,
     /// log₁₀ of the p-value of this much evidence for any message under a random key.
@@ -129,6 +133,7 @@ pub struct ReportParameters {
     pub crs: Option<String>,
     pub demodulator: &'static str,
     pub radius_m: f64,
+    pub radius_reason: RadiusReason,
     pub significance: f64,
     pub noise_m: Option<f64>,
     pub software: String,

@@ -20,8 +20,9 @@ use meshmark_core::demodulation::Demodulation;
 use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Reference,
-    decision::Decoys,
-    matching::LEAST_MATCHED,
+    decision::{Decision, Decoys, Expected, decide_among},
+    matching::{LEAST_MATCHED, Radius},
+    power::Power,
     registration::{Registrar, Registration, Start},
 };
 
@@ -37,8 +38,12 @@ pub struct Examination {
     pub crs: Option<String>,
     /// CRS of the layers of the suspect.
     pub suspect_crs: Vec<String>,
+    /// The matching radius.
+    pub radius: Radius,
     /// The demodulated evidence, or the reason why there is none.
     pub found: std::result::Result<Demodulation, String>,
+    /// What a present mark would show, where something was demodulated.
+    pub power: Option<Power>,
     /// Scores of decoy keys.
     pub decoys: Option<Decoys>,
     /// The drawing data of a report file, if requested.
@@ -68,6 +73,17 @@ pub enum Fit<T> {
     Fits(T),
     /// The reference does not allow the mark; the error holds the reason.
     Unfit(Error),
+}
+
+impl Examination {
+    /// Decides on an expected message, one of the `tried`.
+    pub fn decide(&self, expected: &Expected, tried: usize, significance: f64) -> Decision {
+        match (&self.found, self.power) {
+            (Ok(found), Some(power)) => decide_among(found, power, expected, tried, significance),
+            (Err(reason), _) => Decision::inconclusive(reason.clone()),
+            (Ok(_), None) => unreachable!("power is measured for all that is demodulated"),
+        }
+    }
 }
 
 impl<T> Fit<T> {
@@ -104,7 +120,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     let Registered { map: suspect, registration } =
         register(request, (reference, &compared), suspect, progress)?;
     progress.start("matching", 0);
-    let matched = Matched::new(&compared, &suspect.data, &registration, request.radius_m);
+    let matched = Matched::new(&compared, &suspect.data, &registration, request.radius);
     let demodulated = match demodulate(request, &matched, progress) {
         Ok(demodulated) => demodulated,
         Err(error) => return Ok(unfit(error.into())),
@@ -128,33 +144,34 @@ fn register(
     progress: &mut Progress,
 ) -> Result<Registered> {
     progress.start("registration", 0);
-    let registrar = Registrar::new(&reference.data, &compared.ground, request.radius_m);
+    let registrar = Registrar::new(&reference.data, &compared.ground, request.radius.least_m());
     let file = (request.suspect.as_path(), &WHOLE);
     crs_search::register(&registrar, reference, suspect, file, request.registration)
 }
 
-/// Demodulates what matches; nothing where that is chance.
+/// Demodulates what matches, and measures what a present mark would show; nothing where matches are chance.
 fn demodulate(
     request: &Request,
     matched: &Matched,
     progress: &mut Progress,
-) -> meshmark_core::Result<Option<Demodulated>> {
+) -> meshmark_core::Result<Option<(Demodulated, Power)>> {
     if matched.is_chance() {
         return Ok(None);
     }
-    let (mark, radius_m) = (request.mark(), request.radius_m);
-    let found =
-        progress.listen(|listener| matched.demodulate(mark, request.demodulator, radius_m, listener))?;
-    Ok(Some(found))
+    let (mark, demodulator) = (request.mark(), request.demodulator);
+    let found = progress.listen(|listener| matched.demodulate(mark, demodulator, listener))?;
+    let power = progress.listen(|listener| Power::measure(matched, &found, mark, demodulator, listener))?;
+    Ok(Some((found, power)))
 }
 
 /// What the suspect shows. `crs` is that of the reference.
 fn seen(
     request: &Request,
-    (matched, demodulated): (&Matched, Option<Demodulated>),
+    (matched, demodulated): (&Matched, Option<(Demodulated, Power)>),
     registration: Registration,
     crs: Option<&CoordinateSystem>,
 ) -> Examination {
+    let (demodulated, power) = demodulated.unzip();
     let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
     let reference = &matched.reference.data.vertices;
     let suspect = matched.suspect.vertices.len();
@@ -172,7 +189,9 @@ fn seen(
         reference_digest: reference.digest(),
         crs: crs.map(|crs| crs.brief_name()),
         suspect_crs: Vec::new(),
+        radius: matched.radius,
         found,
+        power,
         decoys,
         sketch,
         evidence_map,

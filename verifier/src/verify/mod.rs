@@ -21,8 +21,8 @@ pub use request::Request;
 
 use crate::{Result, progress::Progress, report::Report};
 use conclusion::conclude;
-use meshmark_core::{demodulation::Demodulation, options::Subject};
-use meshmark_detection::decision::{Decision, Expected, decide_among};
+use meshmark_core::options::Subject;
+use meshmark_detection::decision::{Decision, Expected};
 
 /// Verifies one suspect.
 ///
@@ -35,21 +35,21 @@ pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
         check_reference(record, request, &reference, &reference.data.vertices.digest())?;
     }
     let seen = examine(request, &reference, progress)?.or_fail()?;
-    let (subject, decision) = match &seen.found {
-        Ok(found) => decide_subjects(request, found),
-        Err(reason) => (request.subject.clone(), Decision::inconclusive(reason.clone())),
-    };
+    let (subject, decision) = decide_subjects(request, &seen);
     let request = Request { subject, ..request.clone() };
     Ok(conclude(&request, &seen, decision, progress.finish()))
 }
 
 /// Decides on every subject that the mark may have; returns the best one and its decision.
-fn decide_subjects(request: &Request, found: &Demodulation) -> (Option<Subject>, Decision) {
+fn decide_subjects(request: &Request, seen: &Examination) -> (Option<Subject>, Decision) {
+    if let Err(reason) = &seen.found {
+        return (request.subject.clone(), Decision::inconclusive(reason.clone()));
+    }
     let subjects = request.subjects();
     let tried = subjects.len();
     let decide = |subject: Subject| {
         let expected = Expected::new(&subject, &request.key);
-        (Some(subject), decide_among(found, &expected, tried, request.significance))
+        (Some(subject), seen.decide(&expected, tried, request.significance))
     };
     let p = |decision: &Decision| decision.p_value_log10().unwrap_or(f64::INFINITY);
     let decisions = subjects.into_iter().map(decide);

@@ -18,7 +18,7 @@ use crate::{
 use meshmark_core::{
     demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
 };
-use meshmark_detection::decision::{Decision, Expected, Verdict, decide_among};
+use meshmark_detection::decision::{Decision, Expected, Verdict};
 use std::path::Path;
 
 /// Number of the best records in the list, which also holds every match.
@@ -200,10 +200,7 @@ fn decide_all(
         (0..examined.len()).map(|group| found(group).ok().map(Demodulation::message)).collect();
     let decide = |(group, candidate): (usize, Candidate)| {
         let expected = Expected::new(&candidate.subject, &examined[group].0.key);
-        let decision = match found(group) {
-            Ok(found) => decide_among(found, &expected, tried, significance),
-            Err(reason) => Decision::inconclusive(reason.clone()),
-        };
+        let decision = examined[group].1.decide(&expected, tried, significance);
         let bit_errors = messages[group].as_ref().map(|message| message.errors(&expected.carried));
         Outcome { group, candidate, decision, bit_errors }
     };

@@ -6,7 +6,9 @@ use meshmark_core::{
     record::Record,
 };
 use meshmark_dataset::LabelFields;
-use meshmark_detection::{Demodulator, Mark, decision::Expected, registration::Start};
+use meshmark_detection::{
+    Demodulator, Mark, decision::Expected, matching::RadiusChoice, registration::Start,
+};
 use std::path::PathBuf;
 
 /// The inputs and settings of a verification.
@@ -37,8 +39,8 @@ pub struct Request {
     pub registration: Start,
     /// The demodulator.
     pub demodulator: Demodulator,
-    /// Matching radius t, metres.
-    pub radius_m: f64,
+    /// The choice of the matching radius t.
+    pub radius: RadiusChoice,
     /// The significance: smaller p-values are a match.
     pub significance: f64,
     /// Whether to keep the drawing data of a report file.

@@ -1,0 +1,87 @@
+//! Modulation: a message as the displacement of every vertex, constraints included.
+
+use crate::{
+    Result,
+    carrier::{Carrier, bit_of_coefficient},
+    message::Message,
+    options::Parameters,
+    patches::{Patch, Patches},
+    response::Response,
+    spectrum::Basis,
+};
+use rayon::prelude::*;
+
+/// Returns the displacement of every vertex in canonical order by a mark of full amplitude, metres: α p ∘ b′ on
+/// both axes of every patch. T-junctions and bodies follow as in [`crate::embedding`]; tolerance, grid and the
+/// neighbourhood of a vertex are not considered.
+///
+/// # Errors
+/// Those of [`Patches::carriers`], and a patch that cannot be solved.
+pub fn displacements_m(
+    patches: &Patches,
+    carrier: &Carrier,
+    message: &Message,
+    parameters: &Parameters,
+) -> Result<Vec<[f64; 2]>> {
+    let carriers = patches.carriers(message.len(), parameters)?;
+    let signs = parameters.code.encode(message);
+    let modulate = |(i, chip): (usize, f64)| {
+        parameters.amplitude_m * chip * signs[bit_of_coefficient(i + 1, parameters.chip_rate)]
+    };
+    let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<[f64; 2]>> {
+        let basis = Basis::low_frequencies(patch, carriers + 1)?;
+        let coefficients = [0, 1].map(|axis| {
+            let chips = carrier.chips(number, axis, carriers);
+            chips.into_iter().enumerate().map(modulate).collect::<Vec<f64>>()
+        });
+        Ok(Response::carriers(patch, &basis, parameters.shape).synthesise(&coefficients))
+    };
+    let each = patches.as_slice().par_iter().enumerate().map(of_patch).collect::<Result<Vec<_>>>()?;
+    let mut all = vec![[0.0; 2]; patches.vertex_count()];
+    for (patch, displacements) in patches.as_slice().iter().zip(each) {
+        let own = patch.vertices.iter().enumerate().filter(|(row, _)| !patch.hangs_elsewhere(*row));
+        own.for_each(|(row, &vertex)| all[vertex as usize] = displacements[row]);
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        embedding::embed,
+        ground::Ground,
+        key::SecretKey,
+        map_data::{ChainKind, MapData},
+        options::Rigidity,
+    };
+
+    /// Houses of four corners on a grid.
+    fn town() -> MapData {
+        let corner = |i: usize| [[0.0, 0.0], [9.0, 0.0], [9.0, 7.0], [0.0, 7.0], [0.0, 0.0]][i % 5];
+        let house = |i: usize| [(i / 5 % 20 * 20 + i / 5 % 7) as f64, (i / 100 * 20 + i / 5 % 3) as f64];
+        let coords = (0..1500).map(|i| [0, 1].map(|axis| corner(i)[axis] + house(i)[axis])).collect();
+        let starts: Vec<u32> = (0..1500).step_by(5).collect();
+        MapData::from_chains(coords, &starts, vec![ChainKind::Shell; 300]).unwrap().0
+    }
+
+    #[test]
+    fn a_mark_moves_vertices_as_its_modulation_does() {
+        let town = town();
+        let map = town.on(Ground::Plane { metres_per_unit: 1.0 }, None);
+        let (key, message) = (SecretKey::from_bytes([4; 32]), Message::from_bytes(&[0x5a; 16]));
+        // A body turns by an angle, which the response takes as its sine.
+        for (shape, most_m) in [(Rigidity::Free, 1e-9), (Rigidity::Rigid, 5e-3)] {
+            let parameters = Parameters { shape, ..Parameters::default() };
+            let patches = Patches::new(&map, &parameters).unwrap();
+            let planned = displacements_m(&patches, &Carrier::new(&key), &message, &parameters).unwrap();
+            let marked = embed(&map, &key, &message, &parameters).unwrap();
+            let miss = |((from, to), by): ((&[f64; 2], &[f64; 2]), &[f64; 2])| {
+                (to[0] - from[0] - by[0]).hypot(to[1] - from[1] - by[1])
+            };
+            let each = town.vertices.coords().iter().zip(&marked.coords).zip(&planned).map(miss);
+            let missed = each.filter(|miss| *miss > most_m).count();
+            assert!(missed <= marked.attenuated, "{shape:?} {missed} {}", marked.attenuated);
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Absence: whether a mark that does not show is not there. "No match" is a statement like "match" and has its own
+//! error rate: the probability that a mark which the suspect carries would be missed.
+
+use super::{MARK, Verdict, survival};
+use crate::power::Power;
+use meshmark_core::demodulation::Demodulation;
+
+/// The verdict is "no match" only where a present mark would be missed with a smaller probability.
+const MOST_MISSED_LOG10: f64 = -3.0;
+/// A smaller p-value is never "no match".
+const SUSPICIOUS_LOG10: f64 = -2.0;
+/// Standard deviation of the score of a mark around that of one trial mark on the same suspect: each varies by up
+/// to 1.3 where noise differs from place to place, so that the variance of their difference is 2 · 1.3².
+const TRIAL_DEVIATION: f64 = 1.84;
+/// The bits of a copy of one recipient have this share of the energy of a message, or more; those of an average or
+/// a patchwork of copies have less.
+const LEAST_FULLNESS: f64 = 0.85;
+/// Least standard deviation of the agreement of a recipient's bits.
+const LEAST_DEVIATION: f64 = 0.1;
+
+/// What an expected message shows without matching.
+pub(super) struct Unmatched<'a> {
+    pub found: &'a Demodulation,
+    pub power: Power,
+    /// Number of bits of the message.
+    pub bits: usize,
+    /// The significance for each of the tried messages.
+    pub each: f64,
+    /// log₁₀ of the p-value of the message alone, and of all that were tried.
+    pub p_log10: [f64; 2],
+}
+
+/// The verdict on a message that does not match.
+pub(super) struct Absence {
+    pub verdict: Verdict,
+    pub reason: String,
+    /// log₁₀ of the probability of missing a present mark, where it is known.
+    pub p_missed_log10: Option<f64>,
+}
+
+impl Unmatched<'_> {
+    /// Decides between "no match" and "inconclusive".
+    pub fn decide(&self) -> Absence {
+        let needed = survival::normal_quantile(self.each);
+        let missed = self.missed_log10(needed);
+        let (verdict, reason) = match self.doubt(needed, missed) {
+            Some(doubt) => (Verdict::Inconclusive, doubt),
+            None => (Verdict::NoMatch, format!("{MARK} would have shown, and it does not")),
+        };
+        Absence { verdict, reason, p_missed_log10: Some(missed) }
+    }
+
+    /// Returns why the verdict cannot be "no match", and what would help; `None` where it can.
+    fn doubt(&self, needed: f64, missed: f64) -> Option<String> {
+        let (bits, each) = (self.bits, self.each);
+        let [alone, of_all] = self.p_log10;
+        if (self.found.estimate.len() as f64).sqrt() <= needed {
+            return Some(format!(
+                "a message of {bits} bits is too short for its absence to show at a significance of {each:.1e}: give a \
+                 larger one, or mark with {} bits or more",
+                (needed * needed) as usize + 1
+            ));
+        }
+        if of_all < SUSPICIOUS_LOG10 || alone < self.each.log10() {
+            return Some(
+                "the evidence for this mark is weak, but stronger than chance usually gives: a larger piece of the \
+                 suspect, or the edition of the reference that was marked, would show more"
+                    .into(),
+            );
+        }
+        if self.power == Power::KeyShows && self.fullness() < LEAST_FULLNESS {
+            return Some(
+                "a mark of this key is there, and its bits are weaker than those of one copy: copies of several \
+                 recipients may be mixed, or features replaced, so that nobody can be ruled out; a part of the suspect \
+                 may show more than all of it"
+                    .into(),
+            );
+        }
+        (missed >= MOST_MISSED_LOG10).then(|| {
+            format!(
+                "too few vertices match, or too roughly, for {MARK} to show: a larger piece of the suspect, or the edition \
+                 of the reference that was marked, would show more"
+            )
+        })
+    }
+
+    /// Returns log₁₀ of the probability that a present mark has a score below `needed`.
+    fn missed_log10(&self, needed: f64) -> f64 {
+        let of_recipient = {
+            // With the mark present b̂_j has mean 1 − v_j and variance v_j (1 − v_j).
+            let shares = self.found.variance.iter().map(|v| (1.0 - v).clamp(0.0, 1.0));
+            let (known, spread) =
+                shares.fold((0.0, 0.0), |(k, s), share| (k + share, s + share * (1.0 - share)));
+            let deviation = if known > 0.0 { (spread / known).sqrt() } else { 0.0 };
+            survival::normal_log10((f64::sqrt(known) - needed) / deviation.max(LEAST_DEVIATION))
+        };
+        match self.power {
+            Power::Unmoved => f64::NEG_INFINITY,
+            Power::KeyShows => of_recipient,
+            Power::Trial(score) => {
+                of_recipient.max(survival::normal_log10((score - needed) / TRIAL_DEVIATION))
+            }
+        }
+    }
+
+    /// Returns the energy of the estimated bits as a share of that of a message.
+    fn fullness(&self) -> f64 {
+        let found: f64 = self.found.estimate.iter().map(|b| b * b).sum();
+        let full: f64 = self.found.variance.iter().map(|v| (1.0 - v).max(0.0)).sum();
+        if full > 0.0 { found / full } else { 0.0 }
+    }
+}

@@ -1,0 +1,90 @@
+//! The matching radius, chosen from the distances of mutual nearest neighbours. No key is involved, so decoys
+//! have the same radius.
+
+use super::{chance::out_of_place, matcher::Matcher, matches::Matches};
+use serde::Serialize;
+
+/// The radii that are tried, metres. The first one is large enough for a mark and for the noise of most formats.
+const RADII_M: [f64; 6] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
+/// The share of the vertices found within the largest radius that the chosen radius holds.
+const ENOUGH: f64 = 0.97;
+/// A radius reaches no further than where this share of its matches is chance.
+const MOST_CHANCE: f64 = 0.5;
+
+/// A choice of the matching radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RadiusChoice {
+    /// From the distances of the vertices.
+    FromData,
+    /// This radius, metres.
+    Given(f64),
+}
+
+/// The matching radius and its reason.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Radius {
+    /// t, metres.
+    pub metres: f64,
+    /// The reason.
+    pub reason: RadiusReason,
+}
+
+/// The reason of a matching radius.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RadiusReason {
+    /// The request names it.
+    Given,
+    /// The vertices lie within the least radius.
+    Least,
+    /// Vertices of the reference have their matches farther away than the least radius.
+    Noise,
+}
+
+impl RadiusChoice {
+    /// Returns the radius of the registration, before any noise is known, metres.
+    pub fn least_m(self) -> f64 {
+        match self {
+            RadiusChoice::FromData => RADII_M[0],
+            RadiusChoice::Given(metres) => metres,
+        }
+    }
+
+    /// Returns the radius for vertices of a suspect in the CRS of the reference; `centre` is the middle of the
+    /// reference.
+    pub(crate) fn choose(self, matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius {
+        match self {
+            RadiusChoice::Given(metres) => Radius { metres, reason: RadiusReason::Given },
+            RadiusChoice::FromData => from_data(matcher, moved, unit_m),
+        }
+    }
+}
+
+/// Returns the smallest radius that holds nearly all vertices which match beyond chance.
+fn from_data(matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius {
+    let largest_m = RADII_M[RADII_M.len() - 1];
+    let found = counts(matcher, moved, &matcher.all(moved, largest_m));
+    let [x, y] = out_of_place(unit_m, largest_m);
+    let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
+    let by_chance = counts(matcher, &shifted, &matcher.all(&shifted, largest_m));
+    let most = matcher.len().min(moved.len()) as f64;
+    let within = |radius: usize| excess(found[radius], by_chance[radius], most);
+    let sensible = |radius: &usize| within(*radius) >= (1.0 - MOST_CHANCE) * found[*radius];
+    let last = (0..RADII_M.len()).rev().find(sensible).unwrap_or(0);
+    let first = (0..=last).find(|&radius| within(radius) >= ENOUGH * within(last)).unwrap_or(0);
+    let reason = if first == 0 { RadiusReason::Least } else { RadiusReason::Noise };
+    Radius { metres: RADII_M[first], reason }
+}
+
+/// Returns how many of `found` matches are more than chance, where a shifted suspect has `by_chance` matches and
+/// at most `most` vertices can match. A vertex with its own match has none by chance: e = found − (1 − e / most)
+/// by_chance.
+fn excess(found: f64, by_chance: f64, most: f64) -> f64 {
+    if by_chance >= most { 0.0 } else { ((found - by_chance) / (1.0 - by_chance / most)).max(0.0) }
+}
+
+/// Returns the number of matches within each radius.
+fn counts(matcher: &Matcher, moved: &[[f64; 2]], matches: &Matches) -> [f64; RADII_M.len()] {
+    let distances = matcher.distances_m(moved, matches);
+    RADII_M.map(|radius_m| distances.iter().filter(|distance| **distance <= radius_m).count() as f64)
+}

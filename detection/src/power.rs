@@ -1,0 +1,135 @@
+//! Power: whether a mark would show on this suspect.
+//!
+//! A trial mark, of a key that nobody has, is laid on the suspect as if the suspect were made from a map with that
+//! mark: every vertex of the suspect moves as the nearest place on the linework of the reference does. Matching,
+//! tracking and demodulation are then repeated. The score of the trial mark thus includes what the suspect lost:
+//! displacements beyond the matching radius, vertices that are new on old lines, noise. It needs no model of what
+//! happened to the suspect, and neither the tested key nor a message.
+
+use crate::{
+    decision::p_any_message_log10,
+    examination::{Demodulated, Demodulator, Mark, Matched, Reference},
+    matching::RadiusChoice,
+    progress::Listener,
+};
+use meshmark_core::{
+    Result, carrier::Carrier, ground::Ground, key::SecretKey, map_data::MapData, message::Message,
+    modulation::displacements_m,
+};
+use rayon::prelude::*;
+use rstar::{
+    RTree,
+    primitives::{GeomWithData, Line},
+};
+use sha2::{Digest, Sha256};
+
+/// A key shows whatever its message where the p-value for any message is below 10 to this power.
+const KEY_SHOWS_LOG10: f64 = -9.0;
+/// A place of the suspect farther than this from the linework of the reference is foreign to it, metres.
+const FOREIGN_M: f64 = 20.0;
+
+/// What a present mark would show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Power {
+    /// No vertex moved, and a mark would have moved them.
+    Unmoved,
+    /// The key shows, whatever its message: only the message is in question.
+    KeyShows,
+    /// A trial mark has this score on the suspect, standard deviations of the null hypothesis.
+    Trial(f64),
+}
+
+impl Power {
+    /// Measures the power for a mark on a suspect, of which `seen` is the evidence.
+    ///
+    /// # Errors
+    /// Returns the errors of the demodulation.
+    pub fn measure(
+        matched: &Matched,
+        seen: &Demodulated,
+        mark: Mark,
+        demodulator: Demodulator,
+        listener: Listener,
+    ) -> Result<Self> {
+        if seen.found.chip_correlations.iter().all(|a| *a == 0.0) {
+            return Ok(Power::Unmoved);
+        }
+        let p_any = p_any_message_log10(&seen.found, mark.parameters.chip_rate);
+        if p_any.is_some_and(|p| p < KEY_SHOWS_LOG10) {
+            return Ok(Power::KeyShows);
+        }
+        let key = trial_key(matched);
+        let message = Message::from_signs(&vec![1.0; mark.bits]);
+        let parameters = mark.parameters;
+        let displacement_m =
+            displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
+        let linework = Linework::new(matched.reference.data, &matched.reference.ground);
+        let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
+        let trial = Matched::of_moved(
+            matched.reference,
+            matched.suspect,
+            moved,
+            RadiusChoice::Given(matched.radius.metres),
+        );
+        if trial.is_chance() {
+            return Ok(Power::Trial(0.0));
+        }
+        let trial = trial.demodulate(Mark { key: &key, ..mark }, demodulator, listener)?;
+        Ok(Power::Trial(trial.found.mark_score(&message)))
+    }
+}
+
+/// Returns a key that follows from the two maps, so that equal maps give equal power, and nobody can choose it.
+fn trial_key(matched: &Matched) -> SecretKey {
+    let Matched { suspect, reference: Reference { data, .. }, .. } = matched;
+    let text = format!("meshmark trial mark {} {}", suspect.vertices.digest(), data.vertices.digest());
+    SecretKey::from_bytes(Sha256::digest(text).into())
+}
+
+/// The segments of a reference, and its vertices without a segment, in the plane.
+struct Linework<'a> {
+    ground: &'a Ground,
+    /// Metres per CRS unit in the middle of the map; the origin is there.
+    unit_m: [f64; 2],
+    centre: [f64; 2],
+    tree: RTree<GeomWithData<Line<[f64; 2]>, [u32; 2]>>,
+}
+
+impl<'a> Linework<'a> {
+    fn new(reference: &'a MapData, ground: &'a Ground) -> Self {
+        let (coords, centre) = (reference.vertices.coords(), reference.vertices.centre());
+        let tree = RTree::new();
+        let mut linework = Linework { ground, unit_m: ground.metres_per_unit(centre), centre, tree };
+        let mut alone = vec![true; coords.len()];
+        reference.segments.as_flattened().iter().for_each(|&vertex| alone[vertex as usize] = false);
+        let points = (0..coords.len() as u32).filter(|&vertex| alone[vertex as usize]).map(|v| [v, v]);
+        let line = |ends: [u32; 2]| {
+            let [a, b] = ends.map(|vertex| linework.plane(coords[vertex as usize]));
+            GeomWithData::new(Line::new(a, b), ends)
+        };
+        let lines = reference.segments.iter().copied().chain(points).map(line).collect();
+        linework.tree = RTree::bulk_load(lines);
+        linework
+    }
+
+    fn plane(&self, place: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| (place[axis] - self.centre[axis]) * self.unit_m[axis])
+    }
+
+    /// Returns where a place of the suspect goes when the vertices of the reference move, CRS units.
+    fn moved(&self, place: [f64; 2], displacement_m: &[[f64; 2]]) -> [f64; 2] {
+        let at = self.plane(place);
+        let Some(line) = self.tree.nearest_neighbor(&at) else { return place };
+        let nearest = line.geom().nearest_point(&at);
+        if (nearest[0] - at[0]).hypot(nearest[1] - at[1]) > FOREIGN_M {
+            return place;
+        }
+        let length = line.geom().length_2().sqrt();
+        let start = line.geom().from;
+        let along = (nearest[0] - start[0]).hypot(nearest[1] - start[1]);
+        let share = if length > 0.0 { along / length } else { 0.0 }; // a vertex without a segment has no length
+        let [from, to] = line.data.map(|vertex| displacement_m[vertex as usize]);
+        let unit_m = self.ground.metres_per_unit(place);
+        [0, 1].map(|axis| place[axis] + ((1.0 - share) * from[axis] + share * to[axis]) / unit_m[axis])
+    }
+}
