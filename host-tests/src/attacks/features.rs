@@ -1,17 +1,44 @@
 //! Attacks on features: deletion, order, attributes, features of another map.
 
-use super::{Layer, Map, random::Random, similarity};
+use super::{Feature, Layer, Map, random::Random, similarity};
 use crate::Result;
+use std::collections::HashMap;
 
 /// Deletes a share of the features, chosen at random over all layers.
 pub fn delete(map: &Map, share: f64, seed: u64) -> Map {
     let count = map.features().count();
-    let mut deleted = Random::new(seed).choice(count, (share * count as f64).round() as usize).into_iter();
+    let mut deleted = Random::new(seed).share(count, share).into_iter();
     let mut map = map.clone();
     for layer in &mut map.layers {
         layer.features.retain(|_| deleted.next() == Some(false));
     }
     map
+}
+
+/// Exchanges the geometries of a share of the features for those of an unmarked map, by layer and feature id.
+///
+/// # Errors
+/// A feature that the unmarked map does not have.
+pub fn exchange(map: &Map, unmarked: &Map, share: f64, seed: u64) -> Result<Map> {
+    let mut exchanged = Random::new(seed).share(map.features().count(), share).into_iter();
+    let mut map = map.clone();
+    for layer in &mut map.layers {
+        let same = unmarked.layers.iter().find(|other| other.name == layer.name);
+        let originals: HashMap<Option<u64>, &Feature> = same
+            .into_iter()
+            .flat_map(|layer| &layer.features)
+            .map(|feature| (feature.fid, feature))
+            .collect();
+        for feature in &mut layer.features {
+            if exchanged.next() == Some(true) {
+                let original = originals.get(&feature.fid).ok_or_else(|| {
+                    format!("the unmarked layer \"{}\" has no feature {:?}", layer.name, feature.fid)
+                })?;
+                feature.geometry.clone_from(&original.geometry);
+            }
+        }
+    }
+    Ok(map)
 }
 
 /// Puts layers and features in random order and takes their ids away, for by id they would be sorted again.
@@ -66,6 +93,19 @@ mod tests {
         assert!(left.features().all(|feature| map.features().any(|other| other == feature)));
         assert_eq!(left, delete(&map, 0.8, 3));
         assert_ne!(left, delete(&map, 0.8, 4));
+    }
+
+    #[test]
+    fn exchanged_features_are_the_unmarked_ones_and_the_others_are_untouched() {
+        let unmarked = fixture("kotka.gpkg");
+        let marked = similarity::translate(&unmarked, [1.0, 0.0]);
+        let mixed = exchange(&marked, &unmarked, 0.3, 3).unwrap();
+        let count = unmarked.features().count();
+        let same = |other: &Map| mixed.features().zip(other.features()).filter(|(a, b)| a == b).count();
+        assert_eq!(same(&unmarked), (0.3 * count as f64).round() as usize);
+        assert_eq!(same(&unmarked) + same(&marked), count);
+        let stranger = fixture("helsinki.gpkg");
+        assert!(exchange(&stranger, &unmarked, 1.0, 3).is_err());
     }
 
     #[test]

@@ -88,7 +88,7 @@ impl Map {
 
     /// Every coordinate of every geometry, in the order of the file.
     pub fn coords(&self) -> impl Iterator<Item = [f64; 2]> {
-        self.geometries().flat_map(|geometry| geometry.coords_iter()).map(|c| [c.x, c.y])
+        self.geometries().flat_map(coords)
     }
 
     /// The distinct vertices.
@@ -138,6 +138,11 @@ impl Map {
         }
         Ok(map)
     }
+}
+
+/// Every coordinate of a geometry; the end of a ring again.
+pub fn coords(geometry: &Geometry) -> impl Iterator<Item = [f64; 2]> {
+    geometry.coords_iter().map(|c| [c.x, c.y])
 }
 
 fn read_layer(layer: &mut vector::Layer) -> Result<Layer> {

@@ -4,29 +4,37 @@
 //! stay as they are where the attack is not about them. Where it speaks of vertices, a vertex that several
 //! features share is one vertex.
 
+pub mod bodies;
 pub mod collusion;
 pub mod crop;
+pub mod curves;
 pub mod deformation;
 pub mod features;
 pub mod formats;
 mod map;
 pub mod noise;
+pub mod outlines;
 mod parts;
+pub mod pieces;
 mod random;
 pub mod reproject;
 mod rows;
+pub mod rubber_sheet;
 pub mod similarity;
 pub mod squaring;
 pub mod vertices;
 
 pub use map::{Feature, Field, Layer, Map};
 pub use random::Random;
-pub use rows::{Row, extended_rows, paper_rows};
+pub use rows::{OtherMaps, Row, extended_rows, paper_rows};
 
 use crate::Result;
+use bodies::Motion;
 use crop::Window;
+use curves::Redrawing;
 use deformation::{Cell, Side};
 use formats::Format;
+use outlines::Outline;
 use similarity::{About, Matrix};
 use std::sync::Arc;
 
@@ -43,6 +51,12 @@ pub enum Attack {
     Noise { half_width: f64 },
     /// Gaussian noise on both coordinates of every vertex.
     GaussianNoise { deviation: f64 },
+    /// A share of the features with Gaussian noise.
+    Redraw { share: f64, deviation: f64 },
+    /// Buildings shifted and turned, each by itself.
+    MoveBodies(Motion),
+    /// A smooth field of displacements, on either axis at most this large.
+    RubberSheet { amplitude: f64 },
     /// Cells of a grid turned by this angle, to alternating sides.
     Deform { cell: Cell, degrees: f64, side: Side },
     /// A window cut out.
@@ -51,12 +65,20 @@ pub enum Attack {
     InsertVertices { count: usize },
     /// Edges divided into pieces of at most this length.
     Densify { spacing: f64 },
+    /// Lines and rings drawn anew along their course.
+    DrawAnew(Redrawing),
+    /// Polygons replaced by something simpler, everything else dropped.
+    Outline(Outline),
     /// Lines and rings simplified.
     Simplify { tolerance: f64 },
     /// A share of the vertices deleted.
     DeleteVertices { share: f64 },
     /// A share of the features deleted.
     DeleteFeatures { share: f64 },
+    /// A share of the features exchanged for those of the map before marking.
+    Exchange { unmarked: Arc<Map>, share: f64 },
+    /// The features around a random place, about so many vertices.
+    Piece { vertices: usize },
     /// Layers and features in random order.
     Scramble,
     /// No attributes.
@@ -87,13 +109,20 @@ impl Attack {
             Attack::GaussianNoise { deviation } => {
                 noise::add(map, seed, |random| deviation * random.normal())
             }
+            Attack::Redraw { share, deviation } => noise::redraw(map, *share, *deviation, seed),
+            Attack::MoveBodies(motion) => bodies::shift_and_turn(map, *motion, seed),
+            Attack::RubberSheet { amplitude } => rubber_sheet::bend(map, *amplitude, seed),
             Attack::Deform { cell, degrees, side } => deformation::deform(map, *cell, *degrees, *side),
             Attack::Crop(window) => crop::crop(map, *window),
             Attack::InsertVertices { count } => vertices::insert(map, *count, seed),
             Attack::Densify { spacing } => Ok(vertices::densify(map, *spacing)),
+            Attack::DrawAnew(redrawing) => Ok(redrawing.draw(map, seed)),
+            Attack::Outline(outline) => Ok(outline.of(map)),
             Attack::Simplify { tolerance } => Ok(vertices::simplify(map, *tolerance)),
             Attack::DeleteVertices { share } => vertices::delete(map, *share, seed),
             Attack::DeleteFeatures { share } => Ok(features::delete(map, *share, seed)),
+            Attack::Exchange { unmarked, share } => features::exchange(map, unmarked, *share, seed),
+            Attack::Piece { vertices } => pieces::cut(map, *vertices, seed),
             Attack::Scramble => Ok(features::scramble(map, seed)),
             Attack::DropAttributes => Ok(features::drop_attributes(map)),
             Attack::Merge(foreign) => features::merge(map, foreign),
@@ -186,7 +215,9 @@ pub(crate) mod tests {
     #[test]
     fn attacks_leave_layers_attributes_and_ids_alone() {
         let map = fixture("kotka.gpkg");
-        let rows = paper_rows().into_iter().chain(extended_rows(Arc::new(fixture("helsinki.gpkg"))));
+        let foreign = Arc::new(fixture("helsinki.gpkg"));
+        let others = OtherMaps { foreign, unmarked: Arc::new(map.clone()) };
+        let rows = paper_rows().into_iter().chain(extended_rows(&others));
         for row in rows.filter(|row| row.keeps_features()) {
             let attacked = row.attack.apply(&map, 1).unwrap();
             for (before, after) in map.layers.iter().zip(&attacked.layers) {

@@ -2,6 +2,7 @@
 
 use super::{Map, Random, random::PerVertex};
 use crate::Result;
+use geo::{Coord, Geometry, MapCoords};
 
 /// Adds a number that `draw` makes to either coordinate of every vertex, units of the CRS.
 ///
@@ -13,6 +14,28 @@ pub fn add(map: &Map, seed: u64, draw: impl Fn(&mut Random) -> f64) -> Result<Ma
         let [dx, dy] = noise.at(vertex);
         [vertex[0] + dx, vertex[1] + dy]
     }))
+}
+
+/// Adds Gaussian noise to the vertices of a share of the features; a vertex they share with others parts there.
+///
+/// # Errors
+/// Coordinates that are not finite.
+pub fn redraw(map: &Map, share: f64, deviation: f64, seed: u64) -> Result<Map> {
+    let mut random = Random::new(seed);
+    let noise = PerVertex::draw(map, random.seed(), |random| [(); 2].map(|()| deviation * random.normal()))?;
+    let mut chosen = random.share(map.features().count(), share).into_iter();
+    let mut map = map.clone();
+    for feature in map.layers.iter_mut().flat_map(|layer| &mut layer.features) {
+        if chosen.next() == Some(true) {
+            feature.geometry = feature.geometry.take().map(|geometry: Geometry| {
+                geometry.map_coords(|c| {
+                    let [dx, dy] = noise.at([c.x, c.y]);
+                    Coord { x: c.x + dx, y: c.y + dy }
+                })
+            });
+        }
+    }
+    Ok(map)
 }
 
 /// Puts every vertex on the nearest node of a grid through the origin.
@@ -43,6 +66,18 @@ mod tests {
         assert!((mean_square - 0.03).abs() < 0.002, "variance of a uniform distribution: {mean_square}");
         assert_eq!(noisy, add(&map, 5, |random| random.symmetric(0.3)).unwrap());
         assert_ne!(noisy, add(&map, 6, |random| random.symmetric(0.3)).unwrap());
+    }
+
+    #[test]
+    fn a_share_of_the_features_is_redrawn_and_the_others_stay() {
+        let map = fixture("kotka.gpkg");
+        let redrawn = redraw(&map, 0.3, 0.5, 2).unwrap();
+        let changed = map.features().zip(redrawn.features()).filter(|(a, b)| a != b).count();
+        assert_eq!(changed, (map.features().count() as f64 * 0.3).round() as usize);
+        let moves: Vec<f64> =
+            pairs(&map, &redrawn).map(|(a, b)| b[0] - a[0]).filter(|by| *by != 0.0).collect();
+        let deviation = (moves.iter().map(|by| by * by).sum::<f64>() / moves.len() as f64).sqrt();
+        assert!((deviation - 0.5).abs() < 0.05, "{deviation}");
     }
 
     #[test]

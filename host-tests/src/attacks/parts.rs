@@ -18,7 +18,8 @@ pub enum Part {
 }
 
 impl Part {
-    fn least(self) -> usize {
+    /// The fewest vertices it can have.
+    pub fn least(self) -> usize {
         match self {
             Part::Point => 1,
             Part::Line => 2,
@@ -75,6 +76,11 @@ pub fn visit(geometry: &Geometry, mut f: impl FnMut(Part, &[Coord])) {
 /// [`rewrite`] for a whole map.
 pub fn rewrite_map(map: &Map, f: Rewrite) -> Map {
     map.map_geometries(|geometry| rewrite(geometry, f))
+}
+
+/// Whether a geometry is a polygon or several.
+pub fn is_polygonal(geometry: &Geometry) -> bool {
+    matches!(geometry, Geometry::Polygon(_) | Geometry::MultiPolygon(_))
 }
 
 fn part(part: Part, run: &[Coord], f: Rewrite) -> Option<Vec<Coord>> {

@@ -56,6 +56,11 @@ impl Random {
         self.shuffle(&mut choice);
         choice
     }
+
+    /// Which of `count` things are among a share of them.
+    pub fn share(&mut self, count: usize, share: f64) -> Vec<bool> {
+        self.choice(count, (share * count as f64).round() as usize)
+    }
 }
 
 /// A random value for every distinct vertex of a map: occurrences of a vertex share it, and it does not

@@ -1,10 +1,9 @@
 //! What is done to a marked map, and who is asked about afterwards.
 
 use crate::{
-    attacks::{Map, Row, extended_rows, paper_rows},
+    attacks::{OtherMaps, Row, extended_rows, paper_rows},
     product::Profile,
 };
-use std::sync::Arc;
 
 /// The demodulators of the command, the paper's first.
 pub const DEMODULATORS: [&str; 2] = ["paper", "joint"];
@@ -93,11 +92,11 @@ pub enum Table {
     Special,
 }
 
-/// All cases for a map; `foreign` is laid over it in one of them.
-pub fn all(foreign: Arc<Map>) -> Vec<Case> {
+/// All cases for a map.
+pub fn all(others: &OtherMaps) -> Vec<Case> {
     let attacked = |in_paper| move |row| Case::Attacked { row, in_paper };
     let mut cases: Vec<Case> = paper_rows().into_iter().map(attacked(true)).collect();
-    cases.extend(extended_rows(foreign).into_iter().map(attacked(false)));
+    cases.extend(extended_rows(others).into_iter().map(attacked(false)));
     cases.extend([Case::Unmarked, Case::MarkedAgain]);
     cases.extend([2, 4, 8].map(|copies| Case::Collusion { copies }));
     cases

@@ -4,7 +4,7 @@ pub mod cases;
 
 use crate::{
     Result,
-    attacks::{Map, collusion, noise, similarity},
+    attacks::{Map, OtherMaps, collusion, noise, similarity},
     product::{Asked, Marking, Product, Profile, Report, write_key},
 };
 use cases::{Case, INNOCENTS, Table, all};
@@ -181,9 +181,10 @@ impl Lab<'_> {
             }
             let reference = self.folder.join(format!("{name}.gpkg"));
             map.write(&reference)?;
+            let others = OtherMaps { foreign: foreign(&maps, number)?, unmarked: map.clone() };
             for &profile in &plan.profiles {
                 let wanted = |case: &Case| (plan.wanted)(case, profile);
-                let cases: Vec<Case> = all(foreign(&maps, number)?).into_iter().filter(wanted).collect();
+                let cases: Vec<Case> = all(&others).into_iter().filter(wanted).collect();
                 let most_copies = cases.iter().map(Case::copies).max().unwrap_or(1);
                 let sheet = format!("{name}-{}", profile.name());
                 let copies = (1..=most_copies).map(|copy| self.mark(&sheet, &reference, profile, copy));

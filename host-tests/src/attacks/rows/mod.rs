@@ -1,5 +1,9 @@
 //! The attacks by name: the rows of Table 2 and of the table of other attacks.
 
+mod bodies;
+mod curves;
+mod shares;
+
 use super::{
     Attack, Map, Random,
     crop::Window,
@@ -83,13 +87,48 @@ fn deformed(cell: Cell, side: Side) -> Attack {
     Attack::Deform { cell, degrees: 1.0, side }
 }
 
-/// Attacks the paper does not have. `foreign` is the map that is laid over.
-pub fn extended_rows(foreign: Arc<Map>) -> Vec<Row> {
-    [geometric(), of_vertices(), of_files(foreign), mixes()].concat()
+/// Other maps that attacks bring into the marked one.
+#[derive(Debug, Clone)]
+pub struct OtherMaps {
+    /// Of another place, to be laid over.
+    pub foreign: Arc<Map>,
+    /// The same map before it was marked.
+    pub unmarked: Arc<Map>,
+}
+
+/// Attacks the paper does not have.
+pub fn extended_rows(others: &OtherMaps) -> Vec<Row> {
+    [
+        geometric(),
+        noises(),
+        bodies::rows(),
+        curves::rows(),
+        of_vertices(),
+        shares::rows(&others.unmarked),
+        of_files(others.foreign.clone()),
+        mixes(),
+    ]
+    .concat()
+}
+
+/// Noise beyond the paper's.
+fn noises() -> Vec<Row> {
+    let uniform = [1.0, 1.5, 2.0].map(|half_width| {
+        Row::new(
+            &format!("noise{half_width}"),
+            &format!("noise ±{half_width} m"),
+            Attack::Noise { half_width },
+        )
+    });
+    let gaussian = [0.3, 0.5, 0.7, 1.0].map(|deviation| {
+        let title = format!("Gaussian noise of {deviation} m");
+        Row::new(&format!("gauss{deviation}"), &title, Attack::GaussianNoise { deviation })
+    });
+    [&uniform[..], &gaussian].concat()
 }
 
 fn geometric() -> Vec<Row> {
-    use Attack::{DropAttributes, GaussianNoise, Linear, Noise, Sequence, Snap, Square};
+    use Attack::{DropAttributes, GaussianNoise, Linear, Sequence, Snap, Square};
     let cells = Cell::Size([75.0, 50.0]);
     let about = About::Centre;
     let rows = [
@@ -99,7 +138,6 @@ fn geometric() -> Vec<Row> {
             deformed(cells, Side::Vertex { unit: UNIT }),
         ),
         ("grid10", "10 × 10 cells over the map, ±1°", deformed(Cell::Share(10), Side::Cell)),
-        ("noise1", "noise ±1 m", Noise { half_width: 1.0 }),
         ("gauss29", "Gaussian noise of the same variance as ±50 cm", GaussianNoise { deviation: 0.289 }),
         ("snap25", "snapped to 0.25 m", Snap { spacing: 0.25 }),
         ("snap50", "snapped to 0.5 m", Snap { spacing: 0.5 }),
@@ -127,14 +165,6 @@ fn of_vertices() -> Vec<Row> {
         rows.push(Row::new(
             &format!("vertices{percent}"),
             &format!("{percent} % of the vertices deleted"),
-            attack,
-        ));
-    }
-    for percent in [50, 80] {
-        let attack = Attack::DeleteFeatures { share: f64::from(percent) / 100.0 };
-        rows.push(Row::new(
-            &format!("features{percent}"),
-            &format!("{percent} % of the features deleted"),
             attack,
         ));
     }
@@ -196,8 +226,9 @@ mod tests {
 
     #[test]
     fn ids_and_titles_are_unique_and_table_2_is_whole() {
-        let foreign = Arc::new(Map { layers: Vec::new() });
-        let rows: Vec<Row> = paper_rows().into_iter().chain(extended_rows(foreign)).collect();
+        let empty = Arc::new(Map { layers: Vec::new() });
+        let others = OtherMaps { foreign: empty.clone(), unmarked: empty };
+        let rows: Vec<Row> = paper_rows().into_iter().chain(extended_rows(&others)).collect();
         assert_eq!(paper_rows().len(), 21);
         assert_eq!(rows.iter().map(|row| &row.id).collect::<HashSet<_>>().len(), rows.len());
         assert_eq!(rows.iter().map(|row| &row.title).collect::<HashSet<_>>().len(), rows.len());

@@ -1,0 +1,105 @@
+//! Attacks that draw lines and rings anew: their course stays, their vertices do not.
+
+use super::{
+    Map, Random,
+    parts::{Part, rewrite_map},
+};
+use geo::{ChaikinSmoothing, Coord};
+
+/// How lines and rings are drawn anew. Points stay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Redrawing {
+    /// A vertex at every such distance along the curve, from a random place on, and none of the old ones.
+    Resample { spacing: f64 },
+    /// Corners cut at a quarter and three quarters of every edge (Chaikin 1974), so many times.
+    Chaikin { rounds: usize },
+}
+
+impl Redrawing {
+    /// Draws every line and ring of a map anew, each by itself: shared walls part.
+    pub fn draw(self, map: &Map, seed: u64) -> Map {
+        match self {
+            Redrawing::Resample { spacing } => resample(map, spacing, seed),
+            Redrawing::Chaikin { rounds } => {
+                map.map_geometries(|geometry| Some(geometry.chaikin_smoothing(rounds)))
+            }
+        }
+    }
+}
+
+fn resample(map: &Map, spacing: f64, seed: u64) -> Map {
+    let mut random = Random::new(seed);
+    rewrite_map(map, &mut |part, run| match part {
+        Part::Point => run.to_vec(),
+        Part::Line | Part::Ring => walk(part, run, spacing, random.unit()),
+    })
+}
+
+/// Places along a line or ring, `spacing` apart; closer where it is too short for the fewest vertices it needs.
+/// The first is a share of the spacing away from the start.
+fn walk(part: Part, run: &[Coord], spacing: f64, phase: f64) -> Vec<Coord> {
+    let length = |(a, b): (Coord, Coord)| (b.x - a.x).hypot(b.y - a.y);
+    let total: f64 = part.edges(run).map(length).sum();
+    if total == 0.0 {
+        return run.to_vec();
+    }
+    let spacing = spacing.min(total / part.least() as f64);
+    let (mut walked, mut next) = (0.0, phase * spacing);
+    let mut places = Vec::new();
+    for (a, b) in part.edges(run) {
+        let edge = length((a, b));
+        while next < walked + edge {
+            let share = (next - walked) / edge;
+            places.push(Coord { x: a.x + share * (b.x - a.x), y: a.y + share * (b.y - a.y) });
+            next += spacing;
+        }
+        walked += edge;
+    }
+    places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attacks::tests::{fixture, in_memory, wkt};
+    use geo::{Distance, Euclidean, Point};
+
+    #[test]
+    fn a_walk_takes_steps_of_the_spacing_around_corners() {
+        let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(Coord::from);
+        let places = |part, spacing, phase| -> Vec<[f64; 2]> {
+            walk(part, &square, spacing, phase).into_iter().map(|c| [c.x, c.y]).collect()
+        };
+        assert_eq!(places(Part::Line, 5.0, 0.5), [[2.5, 0.0], [4.0, 3.5]]);
+        assert_eq!(places(Part::Ring, 5.0, 0.5), [[2.5, 0.0], [4.0, 3.5], [0.0, 3.5]]);
+        assert_eq!(places(Part::Ring, 100.0, 0.0).len(), 3, "a ring keeps an area");
+        assert_eq!(places(Part::Line, 100.0, 0.9).len(), 2, "a line keeps its course");
+    }
+
+    #[test]
+    fn resampled_vertices_are_new_and_lie_on_the_old_edges() {
+        let map = fixture("kotka.gpkg");
+        let drawn = Redrawing::Resample { spacing: 2.0 }.draw(&map, 1);
+        assert_eq!(drawn.features().count(), map.features().count());
+        let old = map.vertices().unwrap();
+        let kept = drawn.coords().filter(|p| old.index_of(*p).is_some()).count();
+        assert!(kept * 100 < old.len(), "{kept} of {} vertices are still there", old.len());
+        for (before, after) in map.geometries().zip(drawn.geometries()) {
+            let off = super::super::map::coords(after).map(|p| Euclidean.distance(before, &Point::from(p)));
+            assert!(off.fold(0f64, f64::max) < 1e-6);
+        }
+        assert_eq!(drawn, Redrawing::Resample { spacing: 2.0 }.draw(&map, 1));
+        assert_ne!(drawn, Redrawing::Resample { spacing: 2.0 }.draw(&map, 2));
+    }
+
+    #[test]
+    fn chaikin_cuts_every_corner() {
+        let map = in_memory(&["LINESTRING (0 0,4 0,4 4)", "POLYGON ((0 0,4 0,4 4,0 4,0 0))", "POINT (1 1)"]);
+        let smooth = wkt(&Redrawing::Chaikin { rounds: 1 }.draw(&map, 1));
+        assert_eq!(smooth[0], "LINESTRING (0 0,1 0,3 0,4 1,4 3,4 4)");
+        assert!(!smooth[1].contains("0 0,") && !smooth[1].contains("4 4"), "{}", smooth[1]);
+        assert_eq!(smooth[2], "POINT (1 1)");
+        let rounder = Redrawing::Chaikin { rounds: 3 }.draw(&map, 1);
+        assert!(rounder.coords().count() > 3 * map.coords().count());
+    }
+}
