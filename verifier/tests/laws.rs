@@ -17,6 +17,7 @@ use meshmark_dataset::{Selection, survey};
 use meshmark_detection::{
     decision::{Decision, Expected, Null, Verdict, decide_among},
     matching::Matcher,
+    power::Power,
     registration::{Affine, Registrar, Start},
 };
 use proptest::prelude::*;
@@ -81,9 +82,12 @@ impl Case {
     }
 
     fn decide(&self, found: &Demodulation, message: &Message) -> Decision {
-        decide_among(found, &random(message.clone()), 1, 1e-6)
+        decide_among(found, SHOWS, &random(message.clone()), 1, 1e-6)
     }
 }
+
+/// The mark of these cases shows with a large score.
+const SHOWS: Power = Power::Trial(60.0);
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
@@ -112,13 +116,22 @@ proptest! {
 }
 
 #[test]
-fn of_a_thousand_other_recipients_of_the_same_key_none_is_accused() {
+fn of_a_thousand_other_recipients_of_the_same_key_none_is_accused_and_nearly_all_are_cleared() {
     let case = Case::kotka();
     let found = case.demodulate(&case.marked, &case.key);
     assert_eq!(case.decide(&found, &case.key.recipient_message("ACME GmbH")).verdict, Verdict::Match);
     let others = (0..1000).map(|i| case.key.recipient_message(&format!("recipient {i}")));
-    let accused = others.filter(|message| case.decide(&found, message).verdict != Verdict::NoMatch);
-    assert_eq!(accused.count(), 0);
+    let decisions: Vec<Decision> = others.map(|message| case.decide(&found, &message)).collect();
+    let cleared = |decision: &&Decision| match decision.verdict {
+        Verdict::Match => panic!("{decision:?}"),
+        Verdict::NoMatch => true,
+        Verdict::Inconclusive => {
+            assert!(decision.p_value_log10().unwrap() < -2.0, "{decision:?}");
+            false
+        }
+    };
+    // A p-value below 0.01 clears nobody: 10 ± 3 of a thousand.
+    assert!(decisions.iter().filter(cleared).count() > 970);
 }
 
 #[test]
@@ -131,8 +144,9 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
     let pairs = case.marked.iter().zip(&other.coords);
     let mean: Vec<[f64; 2]> = pairs.map(|(a, b)| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]).collect();
     let found = case.demodulate(&mean, &case.key);
-    let matches =
-        |name: &str| decide_among(&found, &random(message(name)), 1000, 1e-6).verdict == Verdict::Match;
+    let matches = |name: &str| {
+        decide_among(&found, SHOWS, &random(message(name)), 1000, 1e-6).verdict == Verdict::Match
+    };
     assert!(matches("ACME GmbH") && matches("Another Ltd"));
     assert!(!(0..998).any(|i| matches(&format!("recipient {i}"))));
 }
@@ -155,7 +169,7 @@ fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
         )
         .unwrap();
         let decision = case.decide(&found, &key.recipient_message("ACME GmbH"));
-        assert_eq!(decision.verdict, Verdict::NoMatch);
+        assert_ne!(decision.verdict, Verdict::Match);
         10f64.powf(decision.p_mark_log10.unwrap())
     };
     let mut p: Vec<f64> = (100..140).map(p_mark).collect();

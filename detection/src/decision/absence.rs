@@ -9,6 +9,8 @@ use meshmark_core::demodulation::Demodulation;
 const MOST_MISSED_LOG10: f64 = -3.0;
 /// A smaller p-value is never "no match".
 const SUSPICIOUS_LOG10: f64 = -2.0;
+/// No smaller probability of missing a mark is stated: the studies support no more.
+const LEAST_MISSED_LOG10: f64 = -6.0;
 /// Standard deviation of the score of a mark around that of one trial mark on the same suspect: each varies by up
 /// to 1.3 where noise differs from place to place, so that the variance of their difference is 2 · 1.3².
 const TRIAL_DEVIATION: f64 = 1.84;
@@ -34,8 +36,8 @@ pub(super) struct Unmatched<'a> {
 pub(super) struct Absence {
     pub verdict: Verdict,
     pub reason: String,
-    /// log₁₀ of the probability of missing a present mark, where it is known.
-    pub p_missed_log10: Option<f64>,
+    /// log₁₀ of the probability of missing a present mark.
+    pub p_missed_log10: f64,
 }
 
 impl Unmatched<'_> {
@@ -47,18 +49,19 @@ impl Unmatched<'_> {
             Some(doubt) => (Verdict::Inconclusive, doubt),
             None => (Verdict::NoMatch, format!("{MARK} would have shown, and it does not")),
         };
-        Absence { verdict, reason, p_missed_log10: Some(missed) }
+        Absence { verdict, reason, p_missed_log10: missed }
     }
 
     /// Returns why the verdict cannot be "no match", and what would help; `None` where it can.
     fn doubt(&self, needed: f64, missed: f64) -> Option<String> {
         let (bits, each) = (self.bits, self.each);
         let [alone, of_all] = self.p_log10;
-        if (self.found.estimate.len() as f64).sqrt() <= needed {
+        let least_root = needed + survival::normal_quantile(10f64.powf(MOST_MISSED_LOG10)) * LEAST_DEVIATION;
+        if (self.found.estimate.len() as f64).sqrt() <= least_root {
             return Some(format!(
                 "a message of {bits} bits is too short for its absence to show at a significance of {each:.1e}: give a \
                  larger one, or mark with {} bits or more",
-                (needed * needed) as usize + 1
+                (least_root.powi(2) as usize + 1).next_multiple_of(4)
             ));
         }
         if of_all < SUSPICIOUS_LOG10 || alone < self.each.log10() {
@@ -84,7 +87,7 @@ impl Unmatched<'_> {
         })
     }
 
-    /// Returns log₁₀ of the probability that a present mark has a score below `needed`.
+    /// Returns log₁₀ of the probability that a present mark has a score below `needed`, or the least that is stated.
     fn missed_log10(&self, needed: f64) -> f64 {
         let of_recipient = {
             // With the mark present b̂_j has mean 1 − v_j and variance v_j (1 − v_j).
@@ -94,13 +97,12 @@ impl Unmatched<'_> {
             let deviation = if known > 0.0 { (spread / known).sqrt() } else { 0.0 };
             survival::normal_log10((f64::sqrt(known) - needed) / deviation.max(LEAST_DEVIATION))
         };
-        match self.power {
-            Power::Unmoved => f64::NEG_INFINITY,
-            Power::KeyShows => of_recipient,
-            Power::Trial(score) => {
-                of_recipient.max(survival::normal_log10((score - needed) / TRIAL_DEVIATION))
-            }
-        }
+        let of_key = match self.power {
+            Power::Unmoved => return LEAST_MISSED_LOG10,
+            Power::KeyShows => LEAST_MISSED_LOG10,
+            Power::Trial(score) => survival::normal_log10((score - needed) / TRIAL_DEVIATION),
+        };
+        of_recipient.max(of_key).max(LEAST_MISSED_LOG10)
     }
 
     /// Returns the energy of the estimated bits as a share of that of a message.

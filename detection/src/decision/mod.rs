@@ -183,7 +183,7 @@ pub fn decide_among(
         let alone = p_mark.max(p_recipient);
         let p_log10 = [alone, alone + (tried as f64).log10()];
         let absence = Unmatched { found, power, bits, each, p_log10 }.decide();
-        p_missed_log10 = absence.p_missed_log10;
+        p_missed_log10 = Some(absence.p_missed_log10);
         (absence.verdict, absence.reason)
     };
     Decision {
@@ -239,7 +239,7 @@ mod tests {
     fn evidence(estimate: Vec<f64>, scores: Vec<f64>) -> Demodulation {
         Demodulation {
             code: Code::Repetition,
-            variance: vec![0.1; estimate.len()],
+            variance: vec![0.01; estimate.len()],
             estimate,
             scores,
             chip_correlations: vec![1.0; 10_000], // null deviation 100
@@ -307,8 +307,43 @@ mod tests {
         let alone = decide_among(&found, TRIAL, &random(&message), 1, 1e-6);
         let among = decide_among(&found, TRIAL, &random(&message), 1000, 1e-6);
         assert!((alone.p_value_log10().unwrap() + 3.0 - among.p_value_log10().unwrap()).abs() < 1e-12);
-        assert_eq!((alone.verdict, among.verdict), (Verdict::Match, Verdict::NoMatch));
+        assert_eq!((alone.verdict, among.verdict), (Verdict::Match, Verdict::Inconclusive));
         assert_eq!(decide_among(&found, TRIAL, &random(&message), 1 << 60, 0.5).p_value_log10(), Some(0.0));
+    }
+
+    #[test]
+    fn no_match_needs_a_p_value_above_a_hundredth_and_a_trial_mark_that_shows() {
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let of = |score: f64, power: Power| {
+            // 128 bits of this much each against a null deviation of 100.
+            let scores = message.signs().iter().map(|b| score * 100.0 / 128.0 * b).collect();
+            let found = evidence(vec![0.0; 128], scores);
+            decide_among(&found, power, &random(&message), 1, 1e-6).verdict
+        };
+        // No agreement with the recipient, whose p-value is the larger one.
+        assert_eq!(of(0.0, Power::Trial(12.0)), Verdict::NoMatch);
+        assert_eq!(of(0.0, Power::Trial(9.0)), Verdict::Inconclusive, "missed once in a hundred times");
+        let weak: Vec<f64> =
+            message.signs().iter().enumerate().map(|(j, b)| if j % 8 < 5 { *b } else { -b }).collect();
+        let scores = weak.iter().map(|b| 12.0 * b).collect();
+        let found = evidence(weak, scores);
+        let decision = decide_among(&found, TRIAL, &random(&message), 1, 1e-6);
+        assert!(decision.p_value_log10().unwrap() < -2.0, "{decision:?}");
+        assert_eq!(decision.verdict, Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_mixture_of_copies_rules_nobody_out() {
+        let [a, b, c] = [
+            "00112233445566778899aabbccddeeff",
+            "5a5a5a5a0f0f0f0f3c3c3c3c12345678",
+            "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
+        ]
+        .map(|hex| Message::from_hex(hex).unwrap());
+        let mean: Vec<f64> = a.signs().iter().zip(b.signs()).map(|(a, b)| (a + b) / 2.0).collect();
+        let found = evidence(mean.clone(), mean.iter().map(|b| 40.0 * b).collect());
+        let decision = decide_among(&found, Power::KeyShows, &random(&c), 1, 1e-6);
+        assert_eq!(decision.verdict, Verdict::Inconclusive, "{decision:?}");
     }
 
     #[test]

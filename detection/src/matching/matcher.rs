@@ -63,7 +63,7 @@ impl<'a> Matcher<'a> {
     }
 
     /// Returns the number of reference vertices.
-    pub fn len(&self) -> usize {
+    pub fn reference_count(&self) -> usize {
         self.reference.len()
     }
 

@@ -67,7 +67,7 @@ fn from_data(matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius 
     let [x, y] = out_of_place(unit_m, largest_m);
     let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
     let by_chance = counts(matcher, &shifted, &matcher.all(&shifted, largest_m));
-    let most = matcher.len().min(moved.len()) as f64;
+    let most = matcher.reference_count().min(moved.len()) as f64;
     let within = |radius: usize| excess(found[radius], by_chance[radius], most);
     let sensible = |radius: &usize| within(*radius) >= (1.0 - MOST_CHANCE) * found[*radius];
     let last = (0..RADII_M.len()).rev().find(sensible).unwrap_or(0);

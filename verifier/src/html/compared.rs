@@ -98,7 +98,7 @@ pub fn settings(report: &Report) -> Markup {
         ("Shape", text(format!("{} vertices", word(shape)))),
         ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
         ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
-        ("Matching radius", text(format!("{} m", p.radius_m))),
+        ("Matching radius", text(format!("{} m{}", p.radius_m, report.radius_reason()))),
         ("Demodulator", text(p.demodulator.into())),
     ]);
     section("How the mark was assumed to be made and tested", &content)

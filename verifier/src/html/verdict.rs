@@ -93,6 +93,9 @@ fn figures(report: &Report) -> Markup {
             @if let Some(p) = report.p_value_log10 {
                 div { dt { "Probability by chance" } dd { (words::probability(p)) } }
             }
+            @if let Some(p) = report.p_missed_log10 {
+                div { dt { "Probability that a present mark is missed, at most" } dd { (words::probability(p)) } }
+            }
             @if let Some(errors) = report.bit_errors {
                 div { dt { "Message bits that differ" } dd { (count(errors)) " of " (count(report.bits.len())) } }
             }

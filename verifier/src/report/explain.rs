@@ -85,9 +85,13 @@ fn found(report: &Report) -> Vec<String> {
     let (v, p) = (&report.vertices, &report.parameters);
     let mut sentences = assumed(report);
     sentences.push(format!(
-        "{} of the {} reference vertices have a counterpart within {} m, the suspect being brought onto the reference \
+        "{} of the {} reference vertices have a counterpart within {} m{}, the suspect being brought onto the reference \
          by {}.",
-        v.matched, v.reference, p.radius_m, report.registration.method
+        v.matched,
+        v.reference,
+        p.radius_m,
+        report.radius_reason(),
+        report.registration.method
     ));
     let Some(message) = &report.message else {
         sentences.push(format!("Nothing was demodulated: {}.", report.reason));
@@ -152,6 +156,13 @@ pub(crate) fn probabilities(report: &Report) -> Vec<String> {
     if let Some(p) = report.p_any_message_log10 {
         sentences.push(format!(
             "A key that was not used shows so much evidence for any message at all with a probability of {}.",
+            power_of_ten(p)
+        ));
+    }
+    if let Some(p) = report.p_missed_log10 {
+        sentences.push(format!(
+            "If the suspect carried the mark, this test would miss it with a probability of at most {}, as a trial mark of another \
+             key on the same suspect shows.",
             power_of_ten(p)
         ));
     }

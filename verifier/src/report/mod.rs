@@ -55,8 +55,8 @@ pub struct Report {
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the p-value of this much agreement under `null_hypothesis`.
     pub p_recipient_log10: Option<f64>,
-    /// log₁₀ of the probability that this test misses a mark which the suspect carries; null for a match, where it
-    /// is unknown, and where it is 0.
+    /// log₁₀ of the probability that this test misses a mark which the suspect carries, at least −6; null for a
+    /// match and where nothing was decided.
     pub p_missed_log10: Option<f64>,
     /// The content of a copy with another message; null when no message was expected.
     pub null_hypothesis: Option<Null>,

@@ -3,7 +3,7 @@
 use super::Report;
 use crate::words::power_of_ten;
 use meshmark_core::code::Decoder;
-use meshmark_detection::decision::Verdict;
+use meshmark_detection::{decision::Verdict, matching::RadiusReason};
 
 impl Report {
     /// Returns a short text.
@@ -27,8 +27,12 @@ impl Report {
         lines.extend(self.p_value_lines());
         let v = &self.vertices;
         lines.push(format!(
-            "vertices:     {} of {} reference vertices found among {} of the suspect",
-            v.matched, v.reference, v.suspect
+            "vertices:     {} of {} reference vertices found within {} m{} among {} of the suspect",
+            v.matched,
+            v.reference,
+            self.parameters.radius_m,
+            self.radius_reason(),
+            v.suspect
         ));
         lines.push(format!("registration: {}", self.registration.to_text()));
         lines.join("\n") + "\n"
@@ -47,6 +51,12 @@ impl Report {
                 power_of_ten(recipient)
             ));
         }
+        if let Some(p) = self.p_missed_log10 {
+            lines.push(format!(
+                "power:        a mark that the suspect carries is missed with a probability of at most {}",
+                power_of_ten(p)
+            ));
+        }
         if let Some(p) = self.p_any_message_log10.filter(|_| self.verdict != Verdict::Match) {
             let says = match self.shows_key() {
                 true => "a mark of this key is present, whatever its message or code",
@@ -55,6 +65,14 @@ impl Report {
             lines.push(format!("key:          {says} (p-value {})", power_of_ten(p)));
         }
         lines
+    }
+
+    /// Returns why the matching radius is not the least one.
+    pub(crate) fn radius_reason(&self) -> &'static str {
+        match self.parameters.radius_reason {
+            RadiusReason::Given | RadiusReason::Least => "",
+            RadiusReason::Noise => " (the least radius that holds those displaced by noise)",
+        }
     }
 
     /// Returns the other reading of the message, where it is unknown whether the key whitened it.

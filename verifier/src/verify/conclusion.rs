@@ -44,7 +44,7 @@ pub fn conclude(
         p_value_log10: decision.p_value_log10(),
         p_mark_log10: decision.p_mark_log10,
         p_recipient_log10: decision.p_recipient_log10,
-        p_missed_log10: decision.p_missed_log10.filter(|p| p.is_finite()),
+        p_missed_log10: decision.p_missed_log10,
         p_any_message_log10: found.and_then(|f| p_any_message_log10(f, request.parameters.chip_rate)),
         candidates: None,
         decoys: seen.decoys.clone().map(|decoys| Decoys { tested, ..decoys }),
