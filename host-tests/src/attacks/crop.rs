@@ -4,7 +4,7 @@ use super::Map;
 use crate::Result;
 use gdal::{
     cpl::CslStringList,
-    vector::{self, OGRwkbGeometryType, ToGdal},
+    vector::{self, ToGdal},
 };
 use geo::{BoundingRect, Geometry, HasDimensions, Rect};
 
@@ -57,11 +57,8 @@ pub fn crop(map: &Map, window: Window) -> Result<Map> {
     let (min, max) = map.vertices()?.bounds();
     let window = window.within(min, max);
     let mask = vector::Geometry::bbox(window.min().x, window.min().y, window.max().x, window.max().y)?;
-    let mut cropped = map.try_map_geometries(|geometry| clip(geometry, window, &mask))?;
-    for layer in &mut cropped.layers {
-        layer.geometry_type = OGRwkbGeometryType::wkbUnknown; // a polygon may have become several
-    }
-    Ok(cropped)
+    let cropped = map.try_map_geometries(|geometry| clip(geometry, window, &mask))?;
+    Ok(cropped.of_any_type()) // a polygon may have become several
 }
 
 fn clip(geometry: &Geometry, window: Rect, mask: &vector::Geometry) -> Result<Option<Geometry>> {

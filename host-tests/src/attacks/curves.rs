@@ -6,11 +6,17 @@ use super::{
 };
 use geo::{ChaikinSmoothing, Coord};
 
+/// The distance along a curve after which the errors of a tracing hand have lost most of their likeness.
+const HAND: f64 = 3.0;
+
 /// How lines and rings are drawn anew. Points stay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Redrawing {
     /// A vertex at every such distance along the curve, from a random place on, and none of the old ones.
     Resample { spacing: f64 },
+    /// Resampled, and every new vertex off by Gaussian errors of this deviation, which are alike along the curve over
+    /// about [`HAND`]. Where a ring closes, its ends need not fit.
+    Trace { spacing: f64, deviation: f64 },
     /// Corners cut at a quarter and three quarters of every edge (Chaikin 1974), so many times.
     Chaikin { rounds: usize },
 }
@@ -19,7 +25,10 @@ impl Redrawing {
     /// Draws every line and ring of a map anew, each by itself: shared walls part.
     pub fn draw(self, map: &Map, seed: u64) -> Map {
         match self {
-            Redrawing::Resample { spacing } => resample(map, spacing, seed),
+            Redrawing::Resample { spacing } => resample(map, spacing, seed, |_, places| places),
+            Redrawing::Trace { spacing, deviation } => {
+                resample(map, spacing, seed, |random, places| by_hand(&places, deviation, random))
+            }
             Redrawing::Chaikin { rounds } => {
                 map.map_geometries(|geometry| Some(geometry.chaikin_smoothing(rounds)))
             }
@@ -27,17 +36,36 @@ impl Redrawing {
     }
 }
 
-fn resample(map: &Map, spacing: f64, seed: u64) -> Map {
+fn resample(map: &Map, spacing: f64, seed: u64, draw: impl Fn(&mut Random, Vec<Coord>) -> Vec<Coord>) -> Map {
     let mut random = Random::new(seed);
     rewrite_map(map, &mut |part, run| match part {
         Part::Point => run.to_vec(),
-        Part::Line | Part::Ring => walk(part, run, spacing, random.unit()),
+        Part::Line | Part::Ring => {
+            let places = walk(part, run, spacing, random.unit());
+            draw(&mut random, places)
+        }
     })
+}
+
+/// Moves places on a curve by errors that follow one another as a first-order autoregression.
+fn by_hand(places: &[Coord], deviation: f64, random: &mut Random) -> Vec<Coord> {
+    let mut error = [0.0; 2];
+    let mut likeness = 0.0; // to the error before
+    let mut drawn = Vec::with_capacity(places.len());
+    for (i, place) in places.iter().enumerate() {
+        let fresh = (1.0f64 - likeness * likeness).sqrt() * deviation;
+        error = error.map(|error| likeness * error + fresh * random.normal());
+        drawn.push(Coord { x: place.x + error[0], y: place.y + error[1] });
+        if let Some(next) = places.get(i + 1) {
+            likeness = (-(next.x - place.x).hypot(next.y - place.y) / HAND).exp();
+        }
+    }
+    drawn
 }
 
 /// Places along a line or ring, `spacing` apart; closer where it is too short for the fewest vertices it needs.
 /// The first is a share of the spacing away from the start.
-fn walk(part: Part, run: &[Coord], spacing: f64, phase: f64) -> Vec<Coord> {
+pub(super) fn walk(part: Part, run: &[Coord], spacing: f64, phase: f64) -> Vec<Coord> {
     let length = |(a, b): (Coord, Coord)| (b.x - a.x).hypot(b.y - a.y);
     let total: f64 = part.edges(run).map(length).sum();
     if total == 0.0 {
@@ -90,6 +118,19 @@ mod tests {
         }
         assert_eq!(drawn, Redrawing::Resample { spacing: 2.0 }.draw(&map, 1));
         assert_ne!(drawn, Redrawing::Resample { spacing: 2.0 }.draw(&map, 2));
+    }
+
+    #[test]
+    fn a_tracing_hand_errs_by_its_deviation_and_not_anew_at_every_vertex() {
+        let mut random = Random::new(1);
+        let line: Vec<Coord> = (0..20_000).map(|i| Coord { x: f64::from(i), y: 0.0 }).collect();
+        let errors: Vec<f64> = by_hand(&line, 0.4, &mut random).iter().map(|c| c.y).collect();
+        let mean = |lag: usize| {
+            errors.iter().zip(&errors[lag..]).map(|(a, b)| a * b).sum::<f64>() / (errors.len() - lag) as f64
+        };
+        assert!((mean(0).sqrt() - 0.4).abs() < 0.02, "{}", mean(0).sqrt());
+        assert!((mean(3) / mean(0) - (-1f64).exp()).abs() < 0.05, "{}", mean(3) / mean(0));
+        assert!((mean(30) / mean(0)).abs() < 0.05);
     }
 
     #[test]

@@ -110,6 +110,14 @@ impl Map {
         map
     }
 
+    /// The same map with layers that hold geometries of all types.
+    pub fn of_any_type(mut self) -> Map {
+        for layer in &mut self.layers {
+            layer.geometry_type = OGRwkbGeometryType::wkbUnknown;
+        }
+        self
+    }
+
     /// The same map with every geometry replaced; a feature whose geometry becomes `None` goes with it.
     pub fn map_geometries(&self, mut f: impl FnMut(&Geometry) -> Option<Geometry>) -> Map {
         let Ok(map) = self.try_map_geometries::<Infallible>(|geometry| Ok(f(geometry)));

@@ -5,6 +5,7 @@
 //! features share is one vertex.
 
 pub mod bodies;
+pub mod buffers;
 pub mod collusion;
 pub mod crop;
 pub mod curves;
@@ -16,12 +17,15 @@ pub mod noise;
 pub mod outlines;
 mod parts;
 pub mod pieces;
+pub mod quantisation;
 mod random;
+pub mod rasters;
 pub mod reproject;
 mod rows;
 pub mod rubber_sheet;
 pub mod similarity;
 pub mod squaring;
+pub mod topology;
 pub mod vertices;
 
 pub use map::{Feature, Field, Layer, Map};
@@ -30,11 +34,13 @@ pub use rows::{OtherMaps, Row, extended_rows, paper_rows};
 
 use crate::Result;
 use bodies::Motion;
+use buffers::Buffering;
 use crop::Window;
 use curves::Redrawing;
 use deformation::{Cell, Side};
 use formats::Format;
 use outlines::Outline;
+use quantisation::Quantisation;
 use similarity::{About, Matrix};
 use std::sync::Arc;
 
@@ -71,6 +77,16 @@ pub enum Attack {
     Outline(Outline),
     /// Lines and rings simplified.
     Simplify { tolerance: f64 },
+    /// Lines and rings without the vertices of small triangles.
+    SimplifyByArea { area: f64 },
+    /// Shapes grown or shrunk, everything else dropped.
+    Buffer(Buffering),
+    /// Polygons through a raster, everything else dropped.
+    Vectorise { pixel: f64 },
+    /// The polygons of a layer joined.
+    Dissolve,
+    /// Lines and outlines cut at all crossings.
+    Planarise,
     /// A share of the vertices deleted.
     DeleteVertices { share: f64 },
     /// A share of the features deleted.
@@ -87,6 +103,8 @@ pub enum Attack {
     Merge(Arc<Map>),
     /// Into another CRS and perhaps rounded.
     Reproject { epsg: u32, decimals: Option<u32> },
+    /// Onto the grid of a format.
+    Quantise(Quantisation),
     /// Through an exchange format.
     RoundTrip(Format),
     /// Almost right angles made right.
@@ -119,6 +137,11 @@ impl Attack {
             Attack::DrawAnew(redrawing) => Ok(redrawing.draw(map, seed)),
             Attack::Outline(outline) => Ok(outline.of(map)),
             Attack::Simplify { tolerance } => Ok(vertices::simplify(map, *tolerance)),
+            Attack::SimplifyByArea { area } => Ok(vertices::simplify_by_area(map, *area)),
+            Attack::Buffer(buffering) => Ok(buffering.of(map)),
+            Attack::Vectorise { pixel } => rasters::vectorise(map, *pixel),
+            Attack::Dissolve => Ok(topology::dissolve(map)),
+            Attack::Planarise => topology::planarise(map),
             Attack::DeleteVertices { share } => vertices::delete(map, *share, seed),
             Attack::DeleteFeatures { share } => Ok(features::delete(map, *share, seed)),
             Attack::Exchange { unmarked, share } => features::exchange(map, unmarked, *share, seed),
@@ -127,6 +150,7 @@ impl Attack {
             Attack::DropAttributes => Ok(features::drop_attributes(map)),
             Attack::Merge(foreign) => features::merge(map, foreign),
             Attack::Reproject { epsg, decimals } => reproject::reproject(map, *epsg, *decimals),
+            Attack::Quantise(quantisation) => quantisation.apply(map),
             Attack::RoundTrip(format) => formats::round_trip(map, *format),
             Attack::Square { tolerance_degrees } => squaring::square(map, *tolerance_degrees),
             Attack::Sequence(attacks) => {

@@ -1,7 +1,6 @@
 //! Attacks that leave of every polygon something simpler that stands for it, and nothing else of the map.
 
 use super::{Map, parts::is_polygonal};
-use gdal::vector::OGRwkbGeometryType;
 use geo::{BoundingRect, Centroid, Geometry, MinimumRotatedRect};
 
 /// What stands for a polygon.
@@ -18,11 +17,7 @@ pub enum Outline {
 impl Outline {
     /// What is left of a map: features of polygons as their outlines.
     pub fn of(self, map: &Map) -> Map {
-        let mut map = map.map_geometries(|geometry| self.of_polygon(geometry));
-        for layer in &mut map.layers {
-            layer.geometry_type = OGRwkbGeometryType::wkbUnknown;
-        }
-        map
+        map.map_geometries(|geometry| self.of_polygon(geometry)).of_any_type()
     }
 
     fn of_polygon(self, geometry: &Geometry) -> Option<Geometry> {

@@ -6,7 +6,7 @@ use super::{
     random::{PerVertex, Random},
 };
 use crate::Result;
-use geo::{Coord, Geometry, Simplify};
+use geo::{Coord, Geometry, Simplify, SimplifyVw};
 use std::collections::{BTreeSet, HashMap};
 
 /// An edge without a direction: smaller end first, so that all features that share it agree on it.
@@ -114,6 +114,20 @@ pub fn simplify(map: &Map, tolerance: f64) -> Map {
     })
 }
 
+/// Takes the vertices out of every line and ring, each by itself, that span triangles under this area with their
+/// neighbours, smallest first (Visvalingam and Whyatt 1993).
+pub fn simplify_by_area(map: &Map, area: f64) -> Map {
+    map.map_geometries(|geometry| {
+        Some(match geometry {
+            Geometry::LineString(g) => g.simplify_vw(area).into(),
+            Geometry::MultiLineString(g) => g.simplify_vw(area).into(),
+            Geometry::Polygon(g) => g.simplify_vw(area).into(),
+            Geometry::MultiPolygon(g) => g.simplify_vw(area).into(),
+            other => other.clone(),
+        })
+    })
+}
+
 /// Deletes a share of the distinct vertices, chosen at random. A part that is left with too few goes whole,
 /// and its vertices count: the share is met to within the last part.
 ///
@@ -185,6 +199,13 @@ mod tests {
         let map = in_memory(&["LINESTRING (0 0,50 4,99 0)", "LINESTRING (0 0,50 6,99 0)", "POINT (1 1)"]);
         let simple = wkt(&simplify(&map, 5.0));
         assert_eq!(simple, ["LINESTRING (0 0,99 0)", "LINESTRING (0 0,50 6,99 0)", "POINT (1 1)"]);
+    }
+
+    #[test]
+    fn simplification_by_area_drops_small_triangles() {
+        let map = in_memory(&["LINESTRING (0 0,5 1,10 0)", "LINESTRING (0 0,5 3,10 0)", "POINT (1 1)"]);
+        let simple = wkt(&simplify_by_area(&map, 10.0));
+        assert_eq!(simple, ["LINESTRING (0 0,10 0)", "LINESTRING (0 0,5 3,10 0)", "POINT (1 1)"]);
     }
 
     #[test]

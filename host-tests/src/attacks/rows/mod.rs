@@ -1,14 +1,16 @@
 //! The attacks by name: the rows of Table 2 and of the table of other attacks.
 
+mod areas;
 mod bodies;
 mod curves;
+mod files;
 mod shares;
 
 use super::{
     Attack, Map, Random,
     crop::Window,
     deformation::{Cell, Side},
-    formats::Format,
+    quantisation::Quantisation,
     similarity::{About, mirror, rotation, scaling, shear},
 };
 use std::sync::Arc;
@@ -33,7 +35,14 @@ impl Row {
     pub fn keeps_features(&self) -> bool {
         fn keeps(attack: &Attack) -> bool {
             match attack {
-                Attack::Scramble | Attack::DropAttributes | Attack::Merge(_) | Attack::RoundTrip(_) => false,
+                Attack::Scramble
+                | Attack::DropAttributes
+                | Attack::Merge(_)
+                | Attack::RoundTrip(_)
+                | Attack::Vectorise { .. }
+                | Attack::Dissolve
+                | Attack::Planarise
+                | Attack::Quantise(Quantisation::Svg { .. }) => false,
                 Attack::Sequence(attacks) => attacks.iter().all(keeps),
                 _ => true,
             }
@@ -103,9 +112,10 @@ pub fn extended_rows(others: &OtherMaps) -> Vec<Row> {
         noises(),
         bodies::rows(),
         curves::rows(),
+        areas::rows(),
         of_vertices(),
         shares::rows(&others.unmarked),
-        of_files(others.foreign.clone()),
+        files::rows(&others.foreign),
         mixes(),
     ]
     .concat()
@@ -160,6 +170,10 @@ fn of_vertices() -> Vec<Row> {
         let title = format!("Douglas–Peucker {tolerance} m");
         rows.push(Row::new(&format!("dp{tolerance}"), &title, Attack::Simplify { tolerance }));
     }
+    for area in [0.5, 1.0, 4.0] {
+        let title = format!("Visvalingam {area} m²");
+        rows.push(Row::new(&format!("vw{area}"), &title, Attack::SimplifyByArea { area }));
+    }
     for percent in [30, 50, 80] {
         let attack = Attack::DeleteVertices { share: f64::from(percent) / 100.0 };
         rows.push(Row::new(
@@ -167,21 +181,6 @@ fn of_vertices() -> Vec<Row> {
             &format!("{percent} % of the vertices deleted"),
             attack,
         ));
-    }
-    rows
-}
-
-fn of_files(foreign: Arc<Map>) -> Vec<Row> {
-    use Attack::{DropAttributes, Merge, Reproject, RoundTrip};
-    let mut rows = vec![
-        Row::new("4326", "EPSG:4326, 7 decimals", Reproject { epsg: 4326, decimals: Some(7) }),
-        Row::new("3857", "EPSG:3857", Reproject { epsg: 3857, decimals: None }),
-        Row::new("bare", "attributes dropped", DropAttributes),
-        Row::new("merge", "a foreign map laid over", Merge(foreign)),
-    ];
-    for format in [Format::Shapefile, Format::GeoJson, Format::FlatGeobuf, Format::Kml] {
-        let id = format.name().to_lowercase();
-        rows.push(Row::new(&id, &format!("{} and back", format.name()), RoundTrip(format)));
     }
     rows
 }
