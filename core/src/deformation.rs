@@ -10,7 +10,7 @@ use crate::{
     Result,
     noise_law::NoiseLaw,
     options::Parameters,
-    patches::{Patch, Patches},
+    patches::{ALONE, Patch, Patches},
     response::Response,
     spectrum::Basis,
 };
@@ -46,6 +46,7 @@ const WEAK_MARK: f64 = 1.5;
 const WORTH_IT: f64 = 10.0;
 
 const DEVIATIONS_M: [f64; 6] = [0.06, 0.12, 0.25, 0.5, 1.0, 2.0];
+const GROUP_SHIFTS_M: [f64; 7] = [0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2];
 const RANGES_M: [f64; 6] = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0];
 const NOISES_M: [f64; 9] = [0.01, 0.03, 0.06, 0.1, 0.16, 0.25, 0.35, 0.5, 0.8];
 
@@ -56,6 +57,8 @@ pub struct Deformation {
     pub deviation_m: f64,
     /// ℓ, the distance over which it changes.
     pub range_m: f64,
+    /// Standard deviation of the shift of every polygon group as a whole; 0 where groups have none.
+    pub group_shift_m: f64,
     /// σ, standard deviation of the noise.
     pub noise_m: f64,
 }
@@ -127,7 +130,7 @@ pub fn mark_deviation_m(patches: &Patches, carriers: usize, amplitude_m: f64) ->
 impl Deformation {
     /// Returns a disturbance of noise alone.
     pub fn none(noise_m: f64) -> Self {
-        Deformation { deviation_m: 0.0, range_m: 1.0, noise_m }
+        Deformation { deviation_m: 0.0, range_m: 1.0, group_shift_m: 0.0, noise_m }
     }
 
     /// Returns the hyper-parameters of greatest marginal likelihood on a few patches. The mark enters with
@@ -191,15 +194,37 @@ impl Deformation {
         self.deviation_m.powi(2) * (1.0 + d + d * d / 3.0) * (-d).exp()
     }
 
-    /// Returns the covariance of deformation, shift and noise over found vertices, o × o. Only its lower
+    /// Returns whether nothing but a shift of the whole patch is disturbance.
+    pub fn is_still(&self) -> bool {
+        self.deviation_m == 0.0 && self.group_shift_m == 0.0
+    }
+
+    /// Returns the covariance of the shifts of two polygon groups.
+    fn of_groups(&self, a: u32, b: u32) -> f64 {
+        if a == b && a != ALONE { self.group_shift_m.powi(2) } else { 0.0 }
+    }
+
+    /// Returns the covariance of deformation, shifts and noise over found vertices, o × o. Only its lower
     /// triangle is filled, as the factorisation reads no more; weights divide the noise.
-    fn matrix(&self, at: &[[f64; 2]], weights: &[f64]) -> Mat<f64> {
+    fn matrix(&self, at: &[Place], weights: &[f64]) -> Mat<f64> {
         Mat::from_fn(at.len(), at.len(), |i, j| {
+            if i < j {
+                return 0.0;
+            }
             let noise = if i == j { self.noise_m.powi(2) / weights[i] } else { 0.0 };
-            let smooth = if self.deviation_m > 0.0 && i >= j { self.covariance(at[i], at[j]) } else { 0.0 };
-            SHIFT_M.powi(2) + smooth + noise
+            let smooth = if self.deviation_m > 0.0 { self.covariance(at[i].at_m, at[j].at_m) } else { 0.0 };
+            SHIFT_M.powi(2) + self.of_groups(at[i].group, at[j].group) + smooth + noise
         })
     }
+}
+
+/// The place of a found vertex.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    /// Metres.
+    pub at_m: [f64; 2],
+    /// Its polygon group.
+    pub group: u32,
 }
 
 /// The covariance Σ of deformation, shift and noise over o found vertices, factored.
@@ -212,8 +237,8 @@ pub(crate) enum Covariance {
 }
 
 impl Covariance {
-    pub fn new(deformation: &Deformation, at: &[[f64; 2]], weights: &[f64]) -> Self {
-        if deformation.deviation_m > 0.0 {
+    pub fn new(deformation: &Deformation, at: &[Place], weights: &[f64]) -> Self {
+        if !deformation.is_still() {
             return Covariance::Dense(factor(&deformation.matrix(at, weights)));
         }
         Covariance::Shift(weights.iter().map(|w| w / deformation.noise_m.powi(2)).collect())
@@ -267,8 +292,8 @@ pub(crate) fn factor(covariance: &Mat<f64>) -> Llt<f64> {
 pub(crate) struct Found {
     /// Their positions in the patch.
     pub rows: Vec<usize>,
-    /// Their places, metres.
-    pub at: Vec<[f64; 2]>,
+    /// Their places.
+    pub at: Vec<Place>,
     /// Their displacements, o × 2, metres.
     pub moved: Mat<f64>,
 }
@@ -280,8 +305,14 @@ impl Found {
             .filter(|(row, _)| !patch.hangs_elsewhere(*row))
             .filter_map(|(row, &v)| Some((row, observed[v as usize]?)))
             .unzip();
-        let at = rows.iter().map(|&row| patches.positions_m()[patch.vertices[row] as usize]).collect();
+        let at = rows.iter().map(|&row| Place::of(patches, patch.vertices[row])).collect();
         Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
+    }
+}
+
+impl Place {
+    fn of(patches: &Patches, vertex: u32) -> Self {
+        Place { at_m: patches.positions_m()[vertex as usize], group: patches.group(vertex) }
     }
 }
 
@@ -326,14 +357,15 @@ impl Kriging {
         let total = |axis: usize| (0..self.found.rows.len()).map(|o| self.solved[(o, axis)]).sum::<f64>();
         let shift = [0, 1].map(|axis| SHIFT_M.powi(2) * total(axis));
         let anywhere = |v: u32| {
-            let here = patches.positions_m()[v as usize];
-            self.found.at.iter().enumerate().fold(shift, |sum, (o, &there)| {
-                let k = self.deformation.covariance(here, there);
+            let here = Place::of(patches, v);
+            self.found.at.iter().enumerate().fold(shift, |sum, (o, there)| {
+                let k = self.deformation.covariance(here.at_m, there.at_m)
+                    + self.deformation.of_groups(here.group, there.group);
                 [sum[0] + k * self.solved[(o, 0)], sum[1] + k * self.solved[(o, 1)]]
             })
         };
         let mut displacement_m = vec![None; patch.vertices.len()];
-        if self.deformation.deviation_m == 0.0 {
+        if self.deformation.is_still() {
             displacement_m.fill(Some(shift));
         }
         for (o, &row) in self.found.rows.iter().enumerate() {
@@ -348,7 +380,7 @@ impl Kriging {
 
 /// The data of one patch for the likelihood.
 struct Sample {
-    at: Vec<[f64; 2]>,
+    at: Vec<Place>,
     /// o × 2.
     moved: Mat<f64>,
     /// α² E_o E_oᵀ, o × o.
@@ -385,14 +417,15 @@ impl Sample {
     }
 }
 
-/// Finds the maximum by coordinate ascent over the grid of values, with a deformation and without one.
+/// Finds the maximum by coordinate ascent over the grid of values: with a deformation and without one, then with
+/// shifts of polygon groups.
 fn most_likely(log_likelihood: impl Fn(&Deformation) -> f64) -> Deformation {
     let best_of = |candidates: &mut dyn Iterator<Item = Deformation>| {
         let scored = candidates.map(|candidate| (log_likelihood(&candidate), candidate));
         scored.reduce(|best, next| if next.0 > best.0 { next } else { best }).expect("candidates")
     };
     let still = best_of(&mut NOISES_M.iter().map(|&noise_m| Deformation::none(noise_m)));
-    let start = Deformation { deviation_m: 0.25, range_m: 20.0, noise_m: still.1.noise_m };
+    let start = Deformation { deviation_m: 0.25, range_m: 20.0, ..still.1 };
     let mut best = (f64::NEG_INFINITY, start);
     loop {
         let before = best.0;
@@ -406,13 +439,35 @@ fn most_likely(log_likelihood: impl Fn(&Deformation) -> f64) -> Deformation {
             break;
         }
     }
-    if best.0 > still.0 + WORTH_IT { best.1 } else { still.1 }
+    let smooth = if best.0 > still.0 + WORTH_IT { best } else { still };
+    let mut best = smooth;
+    for _ in 0..2 {
+        let now = best.1;
+        let shifts = GROUP_SHIFTS_M.iter().map(|&group_shift_m| Deformation { group_shift_m, ..now });
+        let mut with_noises = shifts
+            .flat_map(|shifted| NOISES_M.iter().map(move |&noise_m| Deformation { noise_m, ..shifted }));
+        best = best_of(&mut with_noises);
+        if best.1.group_shift_m == 0.0 || smooth.1.deviation_m == 0.0 {
+            break;
+        }
+        // Shifts of groups may be what a smooth deformation was taken for.
+        let now = best.1;
+        best = best_of(
+            &mut [0.0].iter().chain(&DEVIATIONS_M).map(|&deviation_m| Deformation { deviation_m, ..now }),
+        );
+    }
+    if best.0 > smooth.0 + WORTH_IT { best.1 } else { smooth.1 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ground::Ground, map::Map, vertices::VertexTable};
+    use crate::{
+        ground::Ground,
+        map::Map,
+        map_data::{ChainKind, MapData},
+        vertices::VertexTable,
+    };
 
     /// 600 scattered vertices on 300 m × 300 m in two patches.
     fn patches() -> Patches {
@@ -469,7 +524,7 @@ mod tests {
         };
         assert!((gram(&quick) - gram(&dense)).norm_max() < 1e-9 * gram(&dense).norm_max());
         // A smooth deformation with negligible noise interpolates the observed displacements.
-        let smooth = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 1e-4 };
+        let smooth = Deformation { deviation_m: 0.5, range_m: 40.0, group_shift_m: 0.0, noise_m: 1e-4 };
         let observed: Vec<_> = patches.positions_m().iter().map(|p| Some(wave(*p))).collect();
         let prediction = smooth.predict(&patches, &observed, 64, 0.0);
         for (predicted, observed) in prediction.displacement_m.iter().zip(observed.iter().flatten()) {
@@ -484,13 +539,40 @@ mod tests {
         for wrong in [100, 301, 400] {
             observed[wrong] = observed[wrong].map(|[x, y]| [x + 0.7, y - 0.7]);
         }
-        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 0.02 };
+        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, group_shift_m: 0.0, noise_m: 0.02 };
         let prediction = deformation.predict(&patches, &observed, 64, 0.001);
         let kept = prediction.without_outliers(&observed, 0.01);
         assert!([100, 301, 400].iter().all(|&wrong| kept[wrong].is_none()));
         let (before, after) = (observed.iter().flatten().count(), kept.iter().flatten().count());
         assert!(before - after <= 3 + before / 50, "{before} {after}");
         assert_eq!(prediction.without_outliers(&[None; 600], 0.01), [None; 600]);
+    }
+
+    #[test]
+    fn shifts_of_polygon_groups_are_told_from_noise_and_predicted_for_all_their_vertices() {
+        let corner = |i: usize| [[0.0, 0.0], [9.0, 0.0], [9.0, 7.0], [0.0, 7.0], [0.0, 0.0]][i % 5];
+        let house = |i: usize| [(i / 5 % 15 * 20 + i / 5 % 7) as f64, (i / 75 * 20 + i / 5 % 3) as f64];
+        let coords = (0..750).map(|i| [0, 1].map(|axis| corner(i)[axis] + house(i)[axis])).collect();
+        let starts: Vec<u32> = (0..750).step_by(5).collect();
+        let (town, _) = MapData::from_chains(coords, &starts, vec![ChainKind::Shell; 150]).unwrap();
+        let patches = Patches::new(
+            &town.on(Ground::Plane { metres_per_unit: 1.0 }, None),
+            &Parameters { patch_size: 300, ..Parameters::default() },
+        )
+        .unwrap();
+        let random = |i: u64| (i.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / 2f64.powi(53) - 0.5;
+        let shift = |root: u32| [0, 1].map(|axis| 3.0 * random(2 * u64::from(root) + axis + 1));
+        let noise = |i: usize| 0.02 * random(7919 + i as u64);
+        let observed: Vec<_> = (town.polygon_roots.iter().enumerate())
+            .map(|(i, &root)| (i % 4 > 0).then(|| shift(root).map(|value| value + noise(i))))
+            .collect();
+        let parameters = Parameters { amplitude_m: 0.001, ..Parameters::default() };
+        let found = Deformation::estimate(&patches, &observed, 64, &parameters).unwrap();
+        assert!(found.group_shift_m >= 0.8 && found.noise_m <= 0.03, "{found:?}");
+        let prediction = found.predict(&patches, &observed, 64, parameters.amplitude_m);
+        let missed = (town.polygon_roots.iter().zip(&prediction.displacement_m))
+            .filter(|(root, d)| (d[0] - shift(**root)[0]).hypot(d[1] - shift(**root)[1]) > 0.05);
+        assert_eq!(missed.count(), 0);
     }
 
     #[test]
@@ -508,7 +590,7 @@ mod tests {
         let patches = patches();
         let mut observed = observed(&patches);
         observed[301] = observed[301].map(|[x, y]| [x + 0.7, y - 0.7]);
-        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, noise_m: 0.02 };
+        let deformation = Deformation { deviation_m: 0.5, range_m: 40.0, group_shift_m: 0.0, noise_m: 0.02 };
         let prediction = deformation.predict(&patches, &observed, 64, 0.001);
         assert!(prediction.weights[301] < 0.2, "{}", prediction.weights[301]);
         assert!(prediction.weights.iter().filter(|w| **w == 1.0).count() > 500);

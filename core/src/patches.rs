@@ -71,8 +71,13 @@ impl Patch {
 pub struct Patches {
     patches: Vec<Patch>,
     positions_m: Vec<[f64; 2]>,
+    /// The polygon group of every vertex, as its first vertex; [`ALONE`] for a vertex without a group.
+    groups: Vec<u32>,
     constraints: Constraints,
 }
+
+/// The group of a vertex that is in no polygon.
+pub(crate) const ALONE: u32 = u32::MAX;
 
 impl Patches {
     /// Meshes the map and cuts it into floor(N / `patch_size`) patches.
@@ -106,7 +111,7 @@ impl Patches {
         }
         let [_, metres] = ground.metres_per_unit(table.centre());
         let positions_m = points.iter().map(|p| p.map(|value| value * metres)).collect();
-        Ok(Patches { patches, positions_m, constraints })
+        Ok(Patches { patches, positions_m, groups: groups(map), constraints })
     }
 
     /// Returns the patches; the position of a patch is its number.
@@ -125,6 +130,11 @@ impl Patches {
         &self.positions_m
     }
 
+    /// Returns the polygon group of a vertex, or [`ALONE`].
+    pub(crate) fn group(&self, vertex: u32) -> u32 {
+        self.groups[vertex as usize]
+    }
+
     /// Returns the constraints on the movement of vertices.
     pub fn constraints(&self) -> &Constraints {
         &self.constraints
@@ -133,7 +143,8 @@ impl Patches {
     /// Returns the first `count` patches alone; the vertices of the others are in none.
     pub(crate) fn head(&self, count: usize) -> Self {
         let patches = self.patches[..count.min(self.patches.len())].to_vec();
-        Patches { patches, positions_m: self.positions_m.clone(), constraints: Constraints::default() }
+        let (positions_m, groups) = (self.positions_m.clone(), self.groups.clone());
+        Patches { patches, positions_m, groups, constraints: Constraints::default() }
     }
 
     /// Returns how many coefficients of a patch and axis carry a message of `bits` bits: one for every
@@ -170,6 +181,15 @@ impl Patches {
         }
         seen.iter().position(|s| !s).map_or(Ok(()), |v| Err(format!("vertex {v} is in no patch")))
     }
+}
+
+/// Returns the polygon group of every vertex.
+fn groups(map: &Map) -> Vec<u32> {
+    let mut sizes = vec![0u32; map.vertices.len()];
+    map.polygon_roots.iter().for_each(|&root| sizes[root as usize] += 1);
+    let group =
+        |vertex: usize| map.polygon_roots.get(vertex).copied().filter(|&root| sizes[root as usize] > 2);
+    (0..map.vertices.len()).map(|vertex| group(vertex).unwrap_or(ALONE)).collect()
 }
 
 /// Splits the vertices by a k-d tree into `parts` leaves of nearly equal size. Each set is cut across the

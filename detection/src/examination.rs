@@ -90,7 +90,10 @@ impl<'a> Matched<'a> {
         registration: &Registration,
         radius: RadiusChoice,
     ) -> Self {
-        Self::of_moved(reference, suspect, registration.apply(suspect.vertices.coords()), radius)
+        let moved = registration.apply(suspect.vertices.coords());
+        Self::of_moved(reference, suspect, moved, |matcher, moved, unit_m| {
+            radius.choose(matcher, moved, unit_m)
+        })
     }
 
     /// Matches the vertices of a suspect at these places, CRS units of the reference.
@@ -98,12 +101,12 @@ impl<'a> Matched<'a> {
         reference: &'a Reference<'a>,
         suspect: &'a MapData,
         moved: Vec<[f64; 2]>,
-        radius: RadiusChoice,
+        radius: impl FnOnce(&Matcher, &[[f64; 2]], [f64; 2]) -> Radius,
     ) -> Self {
         let (ground, vertices) = (&reference.ground, &reference.data.vertices);
         let unit_m = ground.metres_per_unit(vertices.centre());
         let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
-        let radius = radius.choose(&matcher, &moved, unit_m);
+        let radius = radius(&matcher, &moved, unit_m);
         let matches = matcher.all(&moved, radius.metres);
         let [x, y] = out_of_place(unit_m, radius.metres);
         let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
@@ -137,27 +140,27 @@ impl<'a> Matched<'a> {
             let observed = self.matches.displacements_m(coords, &self.moved, ground);
             let found = demodulation::paper(patches, &carrier, &observed, bits, parameters, &step)?;
             let weights = vec![1.0; observed.len()];
-            return Ok(self.demodulated(found, self.matches.clone(), None, weights));
+            return Ok(self.demodulated(found, (self.radius, self.matches.clone()), None, weights));
         }
         listener(Progress::Stage { stage: "deformation", steps: 0 });
         let maps = (self.reference.data, self.suspect);
         let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
-        let Followed { matches, observed, disturbance } =
-            tracking.follow(self.reference.carriers, parameters, self.radius.metres)?;
+        let Followed { radius, matches, observed, disturbance } =
+            tracking.follow(self.reference.carriers, parameters, self.radius)?;
         listener(Progress::Stage { stage, steps });
         let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
-        Ok(self.demodulated(found, matches, Some(disturbance.deformation), disturbance.weights))
+        Ok(self.demodulated(found, (radius, matches), Some(disturbance.deformation), disturbance.weights))
     }
 
     fn demodulated(
         &self,
         found: Demodulation,
-        matches: Matches,
+        (radius, matches): (Radius, Matches),
         deformation: Option<Deformation>,
         weights: Vec<f64>,
     ) -> Demodulated {
         let decoys = Decoys::new(&found, &self.suspect.vertices, &self.reference.data.vertices);
-        Demodulated { found, matches, deformation, weights, decoys }
+        Demodulated { found, radius, matches, deformation, weights, decoys }
     }
 }
 
@@ -165,6 +168,8 @@ impl<'a> Matched<'a> {
 pub struct Demodulated {
     /// The evidence.
     pub found: Demodulation,
+    /// The matching radius after tracking of the deformation.
+    pub radius: Radius,
     /// The matches of the vertices after tracking of the deformation.
     pub matches: Matches,
     /// The estimated deformation; none with the demodulator of the paper.

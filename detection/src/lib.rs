@@ -51,6 +51,7 @@
 
 pub mod decision;
 mod examination;
+mod groups;
 mod histogram;
 pub mod matching;
 pub mod power;

@@ -9,7 +9,6 @@
 use crate::{
     decision::p_any_message_log10,
     examination::{Demodulated, Demodulator, Mark, Matched, Reference},
-    matching::RadiusChoice,
     progress::Listener,
 };
 use meshmark_core::{
@@ -65,12 +64,7 @@ impl Power {
             displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
         let linework = Linework::new(matched.reference.data, &matched.reference.ground);
         let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
-        let trial = Matched::of_moved(
-            matched.reference,
-            matched.suspect,
-            moved,
-            RadiusChoice::Given(matched.radius.metres),
-        );
+        let trial = Matched::of_moved(matched.reference, matched.suspect, moved, |_, _, _| matched.radius);
         if trial.is_chance() {
             return Ok(Power::Trial(0.0));
         }

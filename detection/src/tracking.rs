@@ -1,6 +1,9 @@
 //! Tracking: follows a deformation that moved vertices out of the matching radius.
 
-use crate::matching::{Graph, Matcher, Matches};
+use crate::{
+    groups,
+    matching::{Graph, LEAST_MATCHED, Matcher, Matches, Near, Radius, RadiusChoice, RadiusReason},
+};
 use meshmark_core::{
     Result,
     deformation::{Deformation, Observed, Prediction, mark_deviation_m},
@@ -12,6 +15,9 @@ use meshmark_core::{
 
 /// Number of rounds in which vertices are matched around the predicted deformation.
 const ROUNDS: usize = 3;
+
+/// Groups are taken to have moved as a whole where that gives this many times the information.
+const CLEARLY_MORE: f64 = 1.5;
 
 /// Follows a deformation that moved vertices out of the matching radius: matches give a
 /// deformation, and the deformation predicts the places of more matches. The key is not involved,
@@ -27,6 +33,8 @@ pub struct Tracking<'a> {
 
 /// The result of tracking.
 pub struct Followed {
+    /// The matching radius.
+    pub radius: Radius,
     /// The matches of the vertices.
     pub matches: Matches,
     /// The displacements to demodulate, with shaped noise, metres.
@@ -49,48 +57,41 @@ impl<'a> Tracking<'a> {
     }
 
     /// Matches until the deformation is found, where `carriers` coefficients of a patch and axis
-    /// carry the mark.
+    /// carry the mark. Where noise moved vertices beyond the least radius, polygon groups may have
+    /// moved as a whole; the start that gives more information about a mark is taken.
     ///
     /// # Errors
     /// Returns the errors of the estimation.
-    pub fn follow(&self, carriers: usize, parameters: &Parameters, radius_m: f64) -> Result<Followed> {
+    pub fn follow(&self, carriers: usize, parameters: &Parameters, radius: Radius) -> Result<Followed> {
+        let fit = Fit { tracking: self, carriers, parameters };
         let coords = self.reference.vertices.coords();
-        let mut matches = self.match_joined(coords, radius_m);
-        let mut observed = self.displacements(&matches);
-        let amplitude_m = parameters.amplitude_m;
-        let mark_m = mark_deviation_m(self.patches, carriers, amplitude_m);
-        let fit = |observed: &Observed| -> Result<Prediction> {
-            let deformation = Deformation::estimate(self.patches, observed, carriers, parameters)?;
-            Ok(deformation.predict(self.patches, observed, carriers, amplitude_m))
-        };
-        let mut round = 1;
-        loop {
-            let mut prediction = fit(&observed)?;
-            if prediction.deformation.deviation_m == 0.0 || round == ROUNDS {
-                let kept = prediction.without_outliers(&observed, mark_m);
-                if kept != observed {
-                    prediction = fit(&kept)?;
-                    matches.keep(|vertex| kept[vertex].is_some());
-                    observed = kept;
-                }
-                let (shaped, prediction) =
-                    prediction.shape_noise(self.patches, &observed, carriers, amplitude_m);
-                return Ok(Followed { matches, observed: shaped, disturbance: prediction });
-            }
-            matches = self.match_around(&prediction, radius_m);
-            observed = self.displacements(&matches);
-            round += 1;
+        let plain = fit.follow(coords, radius)?;
+        if radius.reason != RadiusReason::Noise {
+            return Ok(plain);
         }
+        let matcher = Matcher::new(coords, self.ground, self.reference.vertices.centre());
+        let shifts = groups::shifts_m(self.reference, &Near::new(&matcher, self.moved));
+        if shifts.iter().flatten().count() < LEAST_MATCHED {
+            return Ok(plain);
+        }
+        let shifts: Vec<[f64; 2]> = shifts.into_iter().map(Option::unwrap_or_default).collect();
+        let expected = self.shifted(&shifts);
+        let centre = self.reference.vertices.centre();
+        let matcher = Matcher::new(&expected, self.ground, centre);
+        let unit_m = self.ground.metres_per_unit(centre);
+        let radius = RadiusChoice::FromData.choose(&matcher, self.moved, unit_m);
+        let grouped = fit.follow(&expected, Radius { reason: RadiusReason::Groups, ..radius })?;
+        Ok(if grouped.information() > CLEARLY_MORE * plain.information() { grouped } else { plain })
     }
 
-    fn match_around(&self, prediction: &Prediction, radius_m: f64) -> Matches {
+    /// Returns the places of the reference vertices after these displacements, CRS units.
+    fn shifted(&self, displacement_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let shifted = |(p, d): (&[f64; 2], &[f64; 2])| {
             let unit = self.ground.metres_per_unit(*p);
             [p[0] + d[0] / unit[0], p[1] + d[1] / unit[1]]
         };
         let coords = self.reference.vertices.coords().iter();
-        let expected: Vec<[f64; 2]> = coords.zip(&prediction.displacement_m).map(shifted).collect();
-        self.match_joined(&expected, radius_m)
+        coords.zip(displacement_m).map(shifted).collect()
     }
 
     /// Matches with the expected places of the reference vertices, CRS units.
@@ -103,5 +104,56 @@ impl<'a> Tracking<'a> {
     /// matches.
     fn displacements(&self, matches: &Matches) -> Vec<Option<[f64; 2]>> {
         matches.displacements_m(self.reference.vertices.coords(), self.moved, self.ground)
+    }
+}
+
+/// The fit of a disturbance to the displacements of matched vertices.
+struct Fit<'a> {
+    tracking: &'a Tracking<'a>,
+    carriers: usize,
+    parameters: &'a Parameters,
+}
+
+impl Fit<'_> {
+    /// Matches around the expected places of the reference vertices, CRS units, and then around
+    /// those that the fitted disturbance predicts.
+    fn follow(&self, expected: &[[f64; 2]], radius: Radius) -> Result<Followed> {
+        let Fit { tracking, carriers, parameters } = *self;
+        let (patches, amplitude_m) = (tracking.patches, parameters.amplitude_m);
+        let mut matches = tracking.match_joined(expected, radius.metres);
+        let mut observed = tracking.displacements(&matches);
+        let mut round = 1;
+        loop {
+            let mut prediction = self.predict(&observed)?;
+            if prediction.deformation.is_still() || round == ROUNDS {
+                let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
+                let kept = prediction.without_outliers(&observed, mark_m);
+                if kept != observed {
+                    prediction = self.predict(&kept)?;
+                    matches.keep(|vertex| kept[vertex].is_some());
+                    observed = kept;
+                }
+                let (observed, disturbance) =
+                    prediction.shape_noise(patches, &observed, carriers, amplitude_m);
+                return Ok(Followed { radius, matches, observed, disturbance });
+            }
+            matches = tracking.match_joined(&tracking.shifted(&prediction.displacement_m), radius.metres);
+            observed = tracking.displacements(&matches);
+            round += 1;
+        }
+    }
+
+    fn predict(&self, observed: &Observed) -> Result<Prediction> {
+        let Fit { tracking: Tracking { patches, .. }, carriers, parameters } = *self;
+        let deformation = Deformation::estimate(patches, observed, carriers, parameters)?;
+        Ok(deformation.predict(patches, observed, carriers, parameters.amplitude_m))
+    }
+}
+
+impl Followed {
+    /// Returns the number of vertices over the variance of their noise, 1/m²: about proportional to the
+    /// square of the score that a mark has.
+    fn information(&self) -> f64 {
+        self.matches.count as f64 / self.disturbance.deformation.noise_m.powi(2)
     }
 }

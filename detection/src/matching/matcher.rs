@@ -118,6 +118,28 @@ impl<'a> Matcher<'a> {
     }
 }
 
+/// The vertices of a suspect near those of its reference.
+pub struct Near<'a> {
+    matcher: &'a Matcher<'a>,
+    suspect: &'a [[f64; 2]],
+    tree: RTree<Node>,
+}
+
+impl<'a> Near<'a> {
+    /// Indexes the vertices of a suspect in the CRS of the reference.
+    pub fn new(matcher: &'a Matcher<'a>, suspect: &'a [[f64; 2]]) -> Self {
+        Near { matcher, suspect, tree: matcher.tree_of(suspect) }
+    }
+
+    /// Returns the displacements to at most `most` suspect vertices within `radius_m` of a reference vertex,
+    /// metres.
+    pub fn displacements_m(&self, vertex: u32, radius_m: f64, most: usize) -> Vec<[f64; 2]> {
+        let from = self.matcher.reference[vertex as usize];
+        let within = self.matcher.within(&self.tree, from, radius_m).take(most);
+        within.map(|(_, s)| self.matcher.ground.metres_between(from, self.suspect[s as usize])).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,6 @@ mod radius;
 
 pub use chance::{LEAST_MATCHED, is_chance, out_of_place};
 pub use joined::Graph;
-pub use matcher::Matcher;
+pub use matcher::{Matcher, Near};
 pub use matches::Matches;
 pub use radius::{Radius, RadiusChoice, RadiusReason};

@@ -39,6 +39,8 @@ pub enum RadiusReason {
     Least,
     /// Vertices of the reference have their matches farther away than the least radius.
     Noise,
+    /// Polygon groups were shifted as a whole, and vertices match around their shifted places.
+    Groups,
 }
 
 impl RadiusChoice {
@@ -50,8 +52,8 @@ impl RadiusChoice {
         }
     }
 
-    /// Returns the radius for vertices of a suspect in the CRS of the reference; `centre` is the middle of the
-    /// reference.
+    /// Returns the radius for vertices of a suspect in the CRS of the reference; `unit_m` are the metres per unit
+    /// in the middle of the reference.
     pub(crate) fn choose(self, matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius {
         match self {
             RadiusChoice::Given(metres) => Radius { metres, reason: RadiusReason::Given },

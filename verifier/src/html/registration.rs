@@ -54,11 +54,19 @@ fn deformation(evidence: &Evidence) -> Markup {
     html! {
         @match &evidence.sketch.deformation {
             None => "not estimated",
-            Some(d) if d.deviation_m == 0.0 => "none found",
-            Some(d) => (format!(
-                "smooth, {} m (standard deviation), changing over some {} m; taken into account",
-                d.deviation_m, d.range_m
-            )),
+            Some(d) if d.deviation_m == 0.0 && d.group_shift_m == 0.0 => "none found",
+            Some(d) => {
+                @if d.deviation_m > 0.0 {
+                    (format!(
+                        "smooth, {} m (standard deviation), changing over some {} m; ",
+                        d.deviation_m, d.range_m
+                    ))
+                }
+                @if d.group_shift_m > 0.0 {
+                    (format!("groups of polygons shifted by {} m (standard deviation); ", d.group_shift_m))
+                }
+                "taken into account"
+            },
         }
     }
 }

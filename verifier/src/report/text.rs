@@ -72,6 +72,7 @@ impl Report {
         match self.parameters.radius_reason {
             RadiusReason::Given | RadiusReason::Least => "",
             RadiusReason::Noise => " (the least radius that holds those displaced by noise)",
+            RadiusReason::Groups => " of places to which their polygon groups were shifted",
         }
     }
 

@@ -173,6 +173,7 @@ fn seen(
 ) -> Examination {
     let (demodulated, power) = demodulated.unzip();
     let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
+    let radius = demodulated.as_ref().map_or(matched.radius, |demodulated| demodulated.radius);
     let reference = &matched.reference.data.vertices;
     let suspect = matched.suspect.vertices.len();
     let vertices = VertexCounts { reference: reference.len(), suspect, matched: matches.count };
@@ -189,7 +190,7 @@ fn seen(
         reference_digest: reference.digest(),
         crs: crs.map(|crs| crs.brief_name()),
         suspect_crs: Vec::new(),
-        radius: matched.radius,
+        radius,
         found,
         power,
         decoys,

@@ -82,6 +82,8 @@ pub struct DeformationEntry {
     pub deviation_m: f64,
     /// Range of the covariance, metres.
     pub range_m: f64,
+    /// Standard deviation of the shifts of polygon groups as a whole, metres; 0 without any.
+    pub group_shift_m: f64,
 }
 
 /// A sample of the vertices.
@@ -110,8 +112,11 @@ impl Scene<'_> {
             patches: reference.patches.as_slice().iter().map(|patch| self.place(patch)).collect(),
             displacement_m: Histogram::of_values(&lengths, BINS),
             alignment: self.alignment(registration),
-            deformation: deformation
-                .map(|d| DeformationEntry { deviation_m: d.deviation_m, range_m: d.range_m }),
+            deformation: deformation.map(|d| DeformationEntry {
+                deviation_m: d.deviation_m,
+                range_m: d.range_m,
+                group_shift_m: d.group_shift_m,
+            }),
             missing: coords.len() - self.matches.count,
             inserted: inserted.len(),
             sample: sample(&extent, coords, &displacements, &inserted),
