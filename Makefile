@@ -64,8 +64,9 @@ quality: build
 
 # p-values of wrong keys and wrong recipients.
 false-alarms: build
-	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms --bin misses
 	$(BUILD)/false_alarms --out target/false_alarms $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+	$(BUILD)/misses --out target/misses $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # Kills and full disks while marked maps are written, more of them than in the tests.
 faults: build

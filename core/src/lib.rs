@@ -40,6 +40,7 @@ pub mod bodies;
 pub mod carrier;
 pub mod code;
 pub mod constraints;
+mod covariance;
 pub mod deformation;
 pub mod demodulation;
 pub mod disjoint_sets;
