@@ -25,7 +25,7 @@ use rayon::prelude::*;
 /// Correlations with chips spread by this at least, metres.
 const LEAST_SPREAD_M: f64 = 1e-3;
 
-/// What a demodulator found about the channel bits, which the code makes of the message.
+/// The result of a demodulator: estimates of the channel bits, which the code makes of the message.
 #[derive(Debug, Clone)]
 pub struct Demodulation {
     /// How the message became the channel bits.
@@ -168,7 +168,7 @@ fn ratio(a: f64, b: f64) -> f64 {
 /// `bits` is the length of the message; `progress` is called once for every patch.
 ///
 /// # Errors
-/// Those of [`Patches::carriers`] when the message does not fit.
+/// Returns the errors of [`Patches::carriers`] when the message does not fit.
 pub fn paper(
     patches: &Patches,
     carrier: &Carrier,

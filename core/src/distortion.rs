@@ -1,4 +1,4 @@
-//! Figures of what marking does to a map.
+//! The effect of marking on a map, in figures.
 
 use crate::{map::Map, scale::Measure, vertices::VertexTable};
 use rayon::prelude::*;
@@ -55,7 +55,7 @@ pub struct Areas {
     pub max_change: f64,
 }
 
-/// Geometries that GEOS calls invalid.
+/// Geometries that are invalid according to GEOS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Validity {

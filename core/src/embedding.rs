@@ -48,7 +48,7 @@ const MOST_BATCH_BYTES: usize = 512 << 20;
 /// the result before it is returned.
 ///
 /// # Errors
-/// Those of [`Embedding::new`] and [`Embedding::settle`].
+/// Returns the errors of [`Embedding::new`] and [`Embedding::settle`].
 pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Parameters) -> Result<Marked> {
     let embedding = Embedding::new(map, key, message.len(), parameters)?;
     let wanted = embedding.wanted(std::slice::from_ref(message), &|_| ())?;
@@ -72,7 +72,8 @@ impl<'a> Embedding<'a> {
     /// Meshes the map and cuts it into patches, for messages of `bits` bits.
     ///
     /// # Errors
-    /// Those of [`Patches::new`] and [`Patches::carriers`], and [`Error::PrecisionTooCoarse`].
+    /// Returns the errors of [`Patches::new`] and [`Patches::carriers`], and
+    /// [`Error::PrecisionTooCoarse`].
     pub fn new(
         map: &'a Map<'a>,
         key: &SecretKey,
@@ -91,7 +92,7 @@ impl<'a> Embedding<'a> {
     /// read back, and keeps them.
     ///
     /// # Errors
-    /// A patch that cannot be solved.
+    /// Fails on a patch that cannot be solved.
     pub fn for_many(mut self) -> Result<Self> {
         let first = self.patches.as_slice().par_iter().take(READ_BACK_PATCHES);
         let bases = first.map(|patch| Basis::low_frequencies(patch, self.carriers + 1));
@@ -114,7 +115,7 @@ impl<'a> Embedding<'a> {
     /// every patch.
     ///
     /// # Errors
-    /// A patch that cannot be solved.
+    /// Fails on a patch that cannot be solved.
     pub fn wanted(
         &self,
         messages: &[Message],

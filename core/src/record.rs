@@ -136,7 +136,7 @@ impl Record {
     /// Returns the options that made the mark.
     ///
     /// # Errors
-    /// Those of [`Record::subject`], and [`Error::Record`] when a value is out of range.
+    /// Returns the errors of [`Record::subject`], and [`Error::Record`] when a value is out of range.
     pub fn options(&self) -> Result<Options> {
         let options = Options {
             key_path: None,
@@ -161,7 +161,7 @@ impl Record {
     /// Returns the subject of the mark.
     ///
     /// # Errors
-    /// Those of [`Record::message`], and [`Error::Record`] for a recipient with a whitened message.
+    /// Returns the errors of [`Record::message`], and [`Error::Record`] for a recipient with a whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
             Some(_) if self.whitened => Err(Error::Record(

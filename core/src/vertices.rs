@@ -26,7 +26,7 @@ impl VertexTable {
     /// Does the same as [`Self::new`], and returns the canonical index of the vertex of each of `coords`.
     ///
     /// # Errors
-    /// Those of [`Self::new`].
+    /// Returns the errors of [`Self::new`].
     pub fn indexed(coords: Vec<[f64; 2]>) -> Result<(Self, Vec<u32>)> {
         if let Some(index) = coords.iter().position(|p| !p[0].is_finite() || !p[1].is_finite()) {
             let [x, y] = coords[index];

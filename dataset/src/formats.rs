@@ -18,7 +18,7 @@ pub struct Format {
 /// The encoding of coordinates.
 #[derive(Debug)]
 enum Coordinates {
-    /// Bit by bit.
+    /// Every bit is kept.
     Binary,
     /// As decimal numbers; RFC 7946 allows longitudes and latitudes of WGS 84 only.
     Json { always_rfc7946: bool },

@@ -54,7 +54,7 @@ pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
         let value = match key {
             b"type" | b"properties" => continue,
             b"bbox" => b"null".into(),
-            b"geometry" if all.says_more(&value)? => all.without_places_of_geometry(value)?,
+            b"geometry" if all.has_more(&value)? => all.without_places_of_geometry(value)?,
             b"geometry" => continue,
             _ => text[value].to_vec(),
         };
@@ -203,21 +203,21 @@ impl<'a> Text<'a> {
     }
 
     /// Returns whether a geometry has parts that GDAL's model does not hold.
-    fn says_more(&self, geometry: &Range<usize>) -> Option<bool> {
+    fn has_more(&self, geometry: &Range<usize>) -> Option<bool> {
         if !self.is(geometry, b'{') {
             return Some(false);
         }
         for (key, value) in self.members(geometry.clone())? {
-            let says_more = match key {
+            let has_more = match key {
                 b"type" | b"bbox" => false,
                 b"coordinates" => self.has_fourth_ordinate(value)?,
                 b"geometries" if self.is(&value, b'[') => {
-                    let each = self.elements(value)?.into_iter().map(|geometry| self.says_more(&geometry));
+                    let each = self.elements(value)?.into_iter().map(|geometry| self.has_more(&geometry));
                     each.collect::<Option<Vec<bool>>>()?.contains(&true)
                 }
                 _ => true,
             };
-            if says_more {
+            if has_more {
                 return Some(true);
             }
         }

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// Prefixes of the tables of the standard, of SQLite and of spatial indexes.
 const RESERVED: [&str; 3] = ["gpkg", "sqlite_", "rtree_"];
 
-/// Characters with which GDAL lets no name of a GeoPackage layer begin.
+/// Characters that GDAL refuses at the beginning of the name of a GeoPackage layer.
 const NO_BEGINNING: &str = "`~!@#$%^&*()+-={}|[]\\:\";'<>?,./";
 
 /// Returns a name that a GeoPackage accepts for a layer of this name; other formats allow more names.

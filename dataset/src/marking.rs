@@ -157,7 +157,8 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     ))
 }
 
-/// What to say of a layer of a GeoJSON file whose features have foreign members that hold places.
+/// Returns the warning about a layer of a GeoJSON file whose features have foreign members that hold
+/// places.
 pub fn foreign_places(layer: &str) -> String {
     format!(
         "layer \"{layer}\" has geometries or bounding boxes in foreign members of its features, which stay as they are: with \
@@ -165,7 +166,7 @@ pub fn foreign_places(layer: &str) -> String {
     )
 }
 
-/// The first attribute that holds a geometry as text in one of the first features, whatever its name.
+/// Returns the first attribute that holds a geometry as text in one of the first features, whatever its name.
 fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
     let fields: Vec<_> = layer.defn().fields().map(|field| (field.name(), field.field_type())).collect();
     let is_wkt = |text: String| Geometry::from_wkt(&text).is_ok();

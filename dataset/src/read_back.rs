@@ -102,7 +102,7 @@ impl ReadBack<'_> {
     /// Compares two layers; the coordinates of the second are added to `keep`.
     ///
     /// # Errors
-    /// The difference.
+    /// Returns the difference.
     pub fn layers(
         &self,
         meant: gdal::errors::Result<Layer>,
@@ -148,7 +148,7 @@ impl ReadBack<'_> {
     /// Compares a layer with coordinates in the order of its features, bit by bit.
     ///
     /// # Errors
-    /// The difference.
+    /// Returns the difference.
     pub fn in_order(
         &self,
         mut in_file: Layer,

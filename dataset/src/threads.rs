@@ -14,7 +14,7 @@ pub fn threads() -> usize {
 /// A pool whose threads have ended when it is dropped. Those of rayon's own pool end later, possibly while
 /// the process ends, when GDAL has released its storage for them and reports an error.
 pub struct ThreadPool {
-    /// Declared first, so that the threads are asked to end before they are awaited.
+    /// Declared first, so that the pool is dropped, and its threads begin to end, before they are awaited.
     pool: rayon::ThreadPool,
     _threads: Joined,
 }

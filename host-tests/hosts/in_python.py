@@ -59,7 +59,7 @@ def close_a_map_that_cannot_be_marked():
     feature = ogr.Feature(layer.GetLayerDefn())
     feature.SetGeometry(ogr.CreateGeometryFromWkt("POLYGON ((0 0,1 0,1 1,0 1,0 0))"))
     layer.CreateFeature(feature)
-    del layer, dataset  # raises nothing, as docs/driver.md says: Python prints that an exception is ignored
+    del layer, dataset  # raises no exception (docs/driver.md): Python prints that one is ignored
     assert "the whole map is" in gdal.GetLastErrorMsg(), gdal.GetLastErrorMsg()
 
 

@@ -39,7 +39,7 @@ def export_marked_layer():
 
 
 def write(layer, target, name, key="key.json", overwrite="NO", **other):
-    """What QgsVectorFileWriter says: the code and the message."""
+    """Returns code and message of QgsVectorFileWriter."""
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName = "MESHMARK"
     options.layerName = "buildings"

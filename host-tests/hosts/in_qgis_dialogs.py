@@ -41,7 +41,7 @@ def widget_of(dialog, name):
 
 
 def refusal(given):
-    """What the dialog of the export says when it is run with these values."""
+    """Returns the warning of the export dialog when it is run with these values."""
     dialog = open_dialog("export")
     dialog.setParameters({"LAYERS": [f"{HERE}/map.gpkg"], "KEY": f"{HERE}/key.json", "RECORDS": HERE, **given})
     with mock.patch.object(qgis_dialog.QMessageBox, "warning") as warning:
@@ -51,7 +51,7 @@ def refusal(given):
     return warning.call_args[0][2]
 
 
-def says_what_is_missing():
+def missing_values_are_reported():
     output = {"OUTPUT": f"{HERE}/new.gpkg"}
     with folder.unchanged("qgis_dialogs: no recipient, or no file"):
         assert "No recipient is given" in refusal(output)
@@ -185,7 +185,7 @@ Processing.initialize()
 provider = MeshmarkProvider()
 assert QgsApplication.processingRegistry().addProvider(provider)
 QgsProject.instance().addMapLayers([layer("first"), layer("a layer with a very long name, " * 6)])
-says_what_is_missing()
+missing_values_are_reported()
 is_in_order()
 wheel_changes_nothing()
 buttons_are_in_reach()

@@ -63,11 +63,11 @@ def fails(why, name, layers, feedback=None, **options):
         except QgsProcessingException as error:
             assert why in str(error), error
         else:
-            raise AssertionError(f"no error that says {why}")
+            raise AssertionError(f"no error with {why}")
 
 
 class Cancelling(QgsProcessingFeedback):
-    """Cancels when the algorithm says something, or a little later."""
+    """Cancels when the algorithm logs a message, or a little later."""
 
     def __init__(self, text, seconds):
         super().__init__(False)
@@ -177,7 +177,7 @@ def no_layers():
             except QgsProcessingException:
                 assert why in feedback.textLog() and "Traceback" not in feedback.textLog(), feedback.textLog()
             else:
-                raise AssertionError(f"no error that says {why}")
+                raise AssertionError(f"no error with {why}")
 
 
 def verification_fails(what, why, evidence, report, feedback=None):
@@ -195,7 +195,7 @@ def verification_fails(what, why, evidence, report, feedback=None):
         except QgsProcessingException as error:
             assert why in str(error), error
         else:
-            raise AssertionError(f"no error that says {why}")
+            raise AssertionError(f"no error with {why}")
 
 
 def both_files_or_none():
@@ -236,7 +236,7 @@ def impostor(name, *lines):
 
 
 def older_file_is_no_copy():
-    """Exit code 0, and a copy for somebody else in the place: the run fails, and says whose file that is not."""
+    """Exit code 0, and a copy for somebody else in the place: the run fails, and its message names the recipient."""
     buildings = of_map("buildings")
     export("older", [buildings])
     for_b = {"RECIPIENT": "B", "OUTPUT": f"{HERE}/older.gpkg"}
@@ -320,7 +320,7 @@ def run_in_a_model():
 
 
 def run_model(output, **subject):
-    """Whether it succeeds, and what it says. QGIS makes a temporary file of an output that is none of the model's."""
+    """Returns success and log. QGIS makes a temporary file of an output that is none of the model's."""
     context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
     made = model(output is not None, **subject)
     made.initAlgorithm()

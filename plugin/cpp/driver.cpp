@@ -22,7 +22,8 @@ static bool IsAskedForTheDriver(const GDALOpenInfo *info)
 
 // GDAL's writers delete a file of the output's name before they make their own, by the driver that
 // identifies it. While a map is being read through MESHMARK, that driver is this one, and Delete
-// below refuses. So does Open for an update, which GDAL 3.12 asks only of drivers that may know the file.
+// below refuses. So does Open for an update, which GDAL 3.12 calls only for drivers that may
+// recognise the file.
 static int Identify(GDALOpenInfo *info)
 {
     if (HasPrefix(info->pszFilename))

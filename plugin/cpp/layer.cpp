@@ -267,7 +267,8 @@ bool MeshmarkLayer::HasStraightEdges(int field) const
 }
 
 // The source evaluates the filter, in its own language and with its own indices, unless the filter
-// asks for geometry (OGR_GEOM_AREA, OGR_GEOMETRY): that one must be OGR SQL, which we can evaluate.
+// depends on geometry (OGR_GEOM_AREA, OGR_GEOMETRY): such a filter must be OGR SQL, which this
+// class can evaluate.
 OGRErr MeshmarkLayer::SetAttributeFilter(const char *query)
 {
     CPLPushErrorHandler(CPLQuietErrorHandler);
@@ -278,8 +279,8 @@ OGRErr MeshmarkLayer::SetAttributeFilter(const char *query)
 
     const bool refused = m_marked && !is_ogr_sql && NamesGeometry(query);
     if (refused)
-        CPLError(CE_Failure, CPLE_NotSupported, "the filter %s asks for geometry: write it in OGR SQL, so that it sees "
-                 "the marked one", query);
+        CPLError(CE_Failure, CPLE_NotSupported, "the filter %s depends on geometry: write it in OGR SQL, so that it "
+                 "applies to the marked geometry", query);
     const bool hand_on = !m_evaluatesGeometry && !refused;
     const OGRErr error = m_source.SetAttributeFilter(hand_on ? query : nullptr);
     if (refused || error != OGRERR_NONE)

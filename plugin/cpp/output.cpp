@@ -11,7 +11,7 @@ static OGRErr AsError(bool success)
 
 // --- dataset -------------------------------------------------------------------------------------
 
-// Returns the driver of the format, which ogr2ogr asks for field types and layer creation options.
+// Returns the driver of the format, from which ogr2ogr takes field types and layer creation options.
 MeshmarkOutputDataset::MeshmarkOutputDataset(GDALDataset *schema, MeshmarkWriter *writer)
     : m_schema(schema), m_writer(writer)
 {

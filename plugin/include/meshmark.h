@@ -1,15 +1,15 @@
 /*
  * meshmark.h: watermarking for programs that hold a GDAL dataset.
  *
- * Most programs need nothing of this: they open "MESHMARK:<dataset>" with open options and get the
- * marked map. This header is for those that hold a dataset which has no name to open it by: one in
- * memory, a query's result, one opened with options of its own.
+ * Most programs do not need this header: they open "MESHMARK:<dataset>" with open options and read
+ * the marked map. It is for programs that hold a dataset without a name by which it can be opened: a
+ * dataset in memory, the result of a query, or one opened with options of its own.
  *
  *     CPLStringList options;
  *     options.SetNameValue("KEY", "key.json");
  *     options.SetNameValue("RECIPIENT", "ACME GmbH");
  *     GDALDatasetH marked = MeshmarkFilter(source, options.List());
- *     if (!marked) { ... CPLGetLastErrorMsg() says why ... }
+ *     if (!marked) { ... CPLGetLastErrorMsg() is the reason ... }
  *     ... read `marked` by any call of GDAL ...
  *     GDALClose(marked);
  *     GDALClose(source);

@@ -30,7 +30,8 @@ pub fn item_without_places(name: &str, value: &str) -> Option<String> {
 }
 
 impl FeatureRef<'_> {
-    /// Its native data without places, and whether its foreign members hold some; none when there is nothing left.
+    /// Returns its native data without places, and whether its foreign members hold some; `None` when
+    /// nothing is left.
     pub fn native_data(&self) -> Option<(CString, bool)> {
         // SAFETY: the feature is there; both texts are null or C strings, and are copied.
         let (data, foreign) = unsafe {
@@ -59,7 +60,8 @@ impl Feature {
     }
 }
 
-/// Leaves places out of the native data of a feature that is handed on; whether its foreign members hold some.
+/// Removes places from the native data of a feature that is handed on; returns whether its foreign
+/// members hold some.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) -> bool {
     guarded(false, || {

@@ -35,16 +35,16 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Returns the target of ogr2ogr, if `is_asked_for` accepts it. The target precedes the source; options and
+/// Returns the target of ogr2ogr, if `is_accepted` accepts it. The target precedes the source; options and
 /// their values stand before and between them.
-fn target(arguments: &[String], is_asked_for: impl Fn(&Path) -> bool) -> Option<&str> {
+fn target(arguments: &[String], is_accepted: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
     if Path::new(program).file_name()? != "ogr2ogr" {
         return None;
     }
     let source = rest.iter().position(marked_view::is_named_by)?;
     let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
-    let named = (0..source).find(|&at| !is_input(at) && is_asked_for(Path::new(&rest[at])))?;
+    let named = (0..source).find(|&at| !is_input(at) && is_accepted(Path::new(&rest[at])))?;
     Some(&rest[named])
 }
 

@@ -1,4 +1,4 @@
-"""Export with watermark: layers in, a marked file, its record and its reference out."""
+"""Export with watermark: turns layers into a marked file, its record and its reference."""
 
 import os
 import re
@@ -52,7 +52,7 @@ class Export(Algorithm):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
         self.add(
             QgsProcessingParameterMultipleLayers("LAYERS", tr("Layers to export"), vector),
-            tr("What they show is exported, with their filters and unsaved edits. Several layers need a GeoPackage."),
+            tr("The displayed content is exported: filters and unsaved edits apply. Several layers need a GeoPackage."),
         )
         self._options = self._driver_options()
         options = {option.name: parameters.parameter(option) for option in self._options}

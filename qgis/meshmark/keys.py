@@ -12,7 +12,7 @@ from .text import tr
 
 
 class Refused(Exception):
-    """The command made no key; the message is its own."""
+    """The command made no key; the text is its message."""
 
 
 def make(path):
@@ -49,7 +49,7 @@ def ask_and_make(parent):
         parent,
         tr("New key"),
         tr(
-            "The key is in {}. Keep it secret: whoever has it can read and forge marks. Keep a copy of it safe: without"
+            "The key is in {}. Keep it secret: anyone who has it can read and forge marks. Keep a copy of it safe: without"
             " it no mark can be verified."
         ).format(path),
     )

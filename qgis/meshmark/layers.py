@@ -25,7 +25,7 @@ class Snapshot:
         if not isinstance(layer, QgsVectorLayer):
             raise QgsProcessingException(tr("{} is no vector layer: leave it out.").format(layer.name()))
         if not layer.isValid():
-            # It would be taken for an empty one.
+            # Its copy would be empty.
             raise QgsProcessingException(tr("The layer {} cannot be read: repair its source.").format(layer.name()))
         self.name = own_name(layer)
         self.file = path_of(layer)

@@ -12,7 +12,7 @@ from .text import tr
 
 NUMBER = QgsProcessingParameterNumber.Type
 SWITCH = ["NO", "YES"]
-# Of numbers that may be in degrees; those with a default are metres.
+# Decimals of numbers that may be in degrees; those with a default are metres.
 DECIMALS = 9
 
 

@@ -9,7 +9,7 @@ from .text import tr
 
 
 class Proof:
-    """Taken before a copy is made, at places of a record and a reference that are free."""
+    """The state before a copy is made; the places of its record and reference are free."""
 
     def __init__(self, output, record, reference):
         self._output, self._record, self._reference = output, record, reference

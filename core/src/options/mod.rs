@@ -103,7 +103,7 @@ impl Options {
     /// Checks values that do not come from [`Options::parse`].
     ///
     /// # Errors
-    /// Those of [`Options::parse`].
+    /// Returns the errors of [`Options::parse`].
     pub fn check(&self) -> Result<()> {
         let texts: Vec<_> = OPTIONS.iter().filter_map(|o| Some((o.name, self.text_of(o.name)?))).collect();
         Options::parse(texts.iter().map(|(name, text)| (*name, text.as_str()))).map(|_| ())

@@ -25,10 +25,10 @@ pub(super) enum Subcommands {
         /// The file to write; it must not exist
         key_file: PathBuf,
     },
-    /// Say whether a suspect map carries a mark
+    /// Determine whether a suspect map carries a mark
     #[command(long_about = about_verify())]
     Verify(Box<VerifyArgs>),
-    /// Say what marking did to a map: displacement, angles, areas, topology
+    /// Measure the effect of marking on a map: displacement, angles, areas, topology
     ///
     /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
     /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large, 7 an output cannot be written.
@@ -39,7 +39,7 @@ pub(super) enum Subcommands {
     /// read back and carries its message; the same command again skips those that are there. Exit codes: 0 all copies
     /// are there, 2 usage, 5 unreadable map, 6 too large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
-    /// Write man pages and shell completions, for those who make packages
+    /// Write man pages and shell completions, for packagers
     #[command(hide = true)]
     PackageFiles {
         /// The folder to write them to
@@ -140,7 +140,7 @@ pub(super) struct VerifyArgs {
     /// Record the driver wrote when it marked the map
     #[arg(long, value_name = "FILE")]
     pub(super) record: Option<PathBuf>,
-    /// Folder of records (*.json): which of their recipients' copies is it?
+    /// Folder of records (*.json), to find the recipient of the copy
     #[arg(long, value_name = "FOLDER", conflicts_with = "record")]
     pub(super) records: Option<PathBuf>,
     /// The map in question
@@ -164,7 +164,7 @@ pub(super) struct VerifyArgs {
     /// Print the report as one JSON object
     #[arg(long)]
     pub(super) json: bool,
-    /// Say in sentences what was compared, found and not tested
+    /// Describe in sentences what was compared, found and not tested
     #[arg(long, conflicts_with = "json")]
     pub(super) explain: bool,
     /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with their scores
@@ -267,5 +267,5 @@ fn probability(text: &str) -> std::result::Result<f64, String> {
 
 fn about_verify() -> String {
     let codes = ExitCode::ALL.map(|code| format!("{} {}", code as u8, code.meaning())).join(", ");
-    format!("Say whether a suspect map carries a mark\n\nExit codes: {codes}.")
+    format!("Determine whether a suspect map carries a mark\n\nExit codes: {codes}.")
 }
