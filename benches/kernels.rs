@@ -1,8 +1,9 @@
 //! The kernels against their rivals, on one thread: `cargo bench -p meshmark-benches`.
 //!
-//! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go. LAPACK is
-//! that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not installed is left out: the
-//! packages libopenblas-dev, libcgal-dev, and what `make bench` installs for Python.
+//! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go.
+//! LAPACK is that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not
+//! installed is left out: the packages libopenblas-dev, libcgal-dev, and what `make bench` installs
+//! for Python.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::{Mat, Par, Side};

@@ -69,14 +69,14 @@ impl Format {
         self.endings[0]
     }
 
-    /// Returns whether the driver writes native data: the parts of a GeoJSON text that GDAL's features do not
-    /// hold.
+    /// Returns whether the driver writes native data: the parts of a GeoJSON text that GDAL's
+    /// features do not hold.
     pub fn has_native_data(&self) -> bool {
         matches!(self.coordinates, Coordinates::Json { .. })
     }
 
-    /// Returns whether the driver reprojects a layer with these options to WGS 84, which would happen after
-    /// the marking.
+    /// Returns whether the driver reprojects a layer with these options to WGS 84, which would
+    /// happen after the marking.
     pub fn is_wgs84_only(&self, layer_options: Options) -> bool {
         match self.coordinates {
             Coordinates::Binary => false,

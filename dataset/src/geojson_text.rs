@@ -1,8 +1,10 @@
-//! The text of GeoJSON: this module finds positions and bounding boxes in it, so that they can be replaced
-//! and the rest stays unchanged. GDAL keeps the text of a GeoJSON file as *native data*, and writes from it
-//! what its own model of features does not hold: ids, foreign members, a fourth ordinate (RFC 7946).
+//! The text of GeoJSON: this module finds positions and bounding boxes in it, so that they can be
+//! replaced and the rest stays unchanged. GDAL keeps the text of a GeoJSON file as *native data*,
+//! and writes from it what its own model of features does not hold: ids, foreign members, a fourth
+//! ordinate (RFC 7946).
 //!
-//! The text may hold NaN, which a JSON parser refuses, so this module walks it; GDAL has parsed it before.
+//! The text may hold NaN, which a JSON parser refuses, so this module walks it; GDAL has parsed it
+//! before.
 
 use std::ops::Range;
 
@@ -18,8 +20,8 @@ pub enum Place {
     BoundingBox(Range<usize>),
 }
 
-/// Returns the positions and bounding boxes of a feature or a collection in the order of the text; `None`
-/// when it is not an object.
+/// Returns the positions and bounding boxes of a feature or a collection in the order of the text;
+/// `None` when it is not an object.
 pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     let mut places = Vec::new();
     for (key, value) in Text(text).members(0..text.len())? {
@@ -32,10 +34,10 @@ pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     Some(places)
 }
 
-/// Returns the native data of a feature or a collection without the parts that change with the marking or
-/// that its features hold themselves: attributes, bounding boxes, and positions except for ordinates after
-/// the third. Where there was a bounding box, GDAL makes a new one. The result is `None` when nothing is left
-/// that GDAL would write.
+/// Returns the native data of a feature or a collection without the parts that change with the
+/// marking or that its features hold themselves: attributes, bounding boxes, and positions except
+/// for ordinates after the third. Where there was a bounding box, GDAL makes a new one. The result
+/// is `None` when nothing is left that GDAL would write.
 ///
 /// ```
 /// # use meshmark_dataset::geojson_text::without_places;

@@ -1,7 +1,7 @@
 //! Reading back: this module checks that a file holds what was meant.
 //!
-//! Drivers of GDAL may fail silently, and formats round coordinates, reverse rings and reorder features; so
-//! the features of the written file are compared with those that were meant.
+//! Drivers of GDAL may fail silently, and formats round coordinates, reverse rings and reorder
+//! features; so the features of the written file are compared with those that were meant.
 
 use crate::{
     decimals::Digits,

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Reads a report as people do, in Chromium, installed where it is missing: no error, no request, pages of A4. Pictures of
-# it go to the folder that is named: `host-tests/hosts/chromium.sh docs/images` draws those of the documents again.
+# Reads a report as people do, in Chromium, installed where it is missing: no error, no request,
+# pages of A4. Pictures of it go to the folder that is named:
+# `host-tests/hosts/chromium.sh docs/images` draws those of the documents again.
 pictures=$(realpath -m "${1:-/nonexistent}")
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

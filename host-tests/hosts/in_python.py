@@ -1,4 +1,7 @@
-"""Writes through MESHMARK with GDAL's Python: what succeeds is verified by python.sh, what fails must leave nothing."""
+"""Writes through MESHMARK with GDAL's Python; python.sh verifies the copies.
+
+A failure must leave no file.
+"""
 
 import os
 

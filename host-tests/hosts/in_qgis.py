@@ -1,4 +1,7 @@
-"""Reads and writes through MESHMARK with QGIS: what succeeds is verified by qgis.sh, what fails must leave nothing."""
+"""Reads and writes through MESHMARK with QGIS; qgis.sh verifies the copies.
+
+A failure must leave no file.
+"""
 
 import os
 import shutil

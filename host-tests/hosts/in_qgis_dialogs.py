@@ -1,4 +1,4 @@
-"""Works the plugin's dialogs as their user does: what they refuse, what the wheel does, where their buttons are."""
+"""Uses the plugin's dialogs as a user does: refusals, mouse wheel, buttons."""
 
 import os
 import sys
@@ -76,7 +76,7 @@ def is_in_order():
 
 
 def turn_wheel(over):
-    """Whether the box keeps the event for itself; who does not leaves it to the panel, which scrolls."""
+    """Returns whether the box handles the event; otherwise the panel scrolls."""
     middle = QPointF(over.rect().center())
     place = over.mapToGlobal(over.rect().center())
     event = QWheelEvent(
@@ -141,7 +141,7 @@ def no_map_is_compared_with_itself():
 
 
 def press_new_key(dialog, path):
-    """What is said, and whether as a warning."""
+    """Returns the message, and whether it is a warning."""
     buttons = [b for b in dialog.mainWidget().findChildren(QPushButton) if b.text() == "New key…"]
     assert len(buttons) == 1, buttons
     with mock.patch.object(keys, "QMessageBox") as box, mock.patch.object(keys, "QFileDialog") as files:

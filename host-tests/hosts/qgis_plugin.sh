@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Installs the QGIS plugin from its zip into a profile of its own and marks, verifies and compares with it: by
-# qgis_process, by PyQGIS, and in QGIS itself on a virtual screen, which takes the pictures of docs/qgis.md (into the
-# folder $PICTURES when it is given). Installs QGIS and Xvfb where they are missing.
+# Installs the QGIS plugin from its zip into a profile of its own and marks, verifies and compares
+# with it: by qgis_process, by PyQGIS, and in QGIS itself on a virtual screen, which takes the
+# pictures of docs/qgis.md (into the folder $PICTURES when it is given). Installs QGIS and Xvfb
+# where they are missing.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 install_missing gdal-bin qgis python3-qgis qgis-providers python3-gdal unzip xvfb xauth

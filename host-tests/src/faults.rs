@@ -22,7 +22,8 @@ pub enum Fault {
     FileSize(usize),
 }
 
-/// A host in which writing can be made to fail, with a small map, and perhaps a target that is there already.
+/// A host in which writing can be made to fail, with a small map, and perhaps a target that is
+/// there already.
 pub struct Scene {
     /// The host.
     pub host: Host,
@@ -117,11 +118,13 @@ impl Scene {
         outcome
     }
 
-    /// The same command again removes what a killed one left, and does its work where that is still to be done.
+    /// The same command again removes what a killed one left, and does its work where that is still
+    /// to be done.
     #[track_caller]
     fn check_next_run(&self, outcome: Outcome, context: &str) {
         let next = self.write(None);
-        let done_before = outcome == Outcome::Complete; // then the reference is in the way of another
+        // In this case the reference is in the way of another one.
+        let done_before = outcome == Outcome::Complete;
         assert_eq!(next.code == Some(0), !done_before, "{context}\nnext: {}", next.stderr);
         assert_eq!(self.outcome(context), Outcome::Complete);
         self.check_no_leftovers(Outcome::Complete, context);
@@ -233,8 +236,9 @@ impl Distribution {
         run(&self.host, &self.preload, self.host.meshmark().to_str().unwrap(), &arguments, fault)
     }
 
-    /// Runs with a fault and asserts that every copy that is there is complete, and that the same command again makes
-    /// the rest and leaves nothing else; how many copies there were before that.
+    /// Runs with a fault and asserts that every copy that is there is complete, and that the same
+    /// command again makes the rest and leaves nothing else; how many copies there were before
+    /// that.
     #[track_caller]
     pub fn survives(&self, fault: Fault) -> usize {
         let failed = self.run(Some(fault));
@@ -289,7 +293,8 @@ pub fn points(count: usize, properties: &str) -> String {
     format!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, features.join(","))
 }
 
-/// A shell script that runs its arguments with a limit on the size of files, as an error instead of a signal.
+/// A shell script that runs its arguments with a limit on the size of files, as an error instead of
+/// a signal.
 fn limited(bytes: usize) -> String {
     format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", bytes / 512) // POSIX: units of 512 bytes
 }

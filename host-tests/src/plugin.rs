@@ -116,8 +116,8 @@ impl Host {
         }
     }
 
-    /// The command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a recipient, the reference
-    /// `ref.gpkg`, the record `record.json` and more options.
+    /// The command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a recipient,
+    /// the reference `ref.gpkg`, the record `record.json` and more options.
     pub fn create_arguments(target: &str, source: &str, more: &[&str]) -> Vec<String> {
         let options = ["KEY=key.json", "RECIPIENT=ACME GmbH", "REFERENCE=ref.gpkg", "RECORD=record.json"];
         let named = |name: &str| {
@@ -191,8 +191,8 @@ impl Run {
         self
     }
 
-    /// The failures of GDAL among its messages, but for the one that `ogr2ogr` ends with when a source does not open: in
-    /// GDAL 3.12 it is an `ERROR`, in 3.6 a `FAILURE`.
+    /// The failures of GDAL among its messages, but for the one that `ogr2ogr` ends with when a
+    /// source does not open: in GDAL 3.12 it is an `ERROR`, in 3.6 a `FAILURE`.
     pub fn errors(&self) -> Vec<&str> {
         let is_last_word = |line: &&str| line.starts_with("ERROR 1: Unable to open datasource `");
         self.stderr.lines().filter(|line| line.starts_with("ERROR ") && !is_last_word(line)).collect()

@@ -18,7 +18,8 @@ const POLL: Duration = Duration::from_millis(2);
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Run {
     pub seconds: f64,
-    /// Seconds of processor time, user and system, of all threads, and of children that were waited for.
+    /// Seconds of processor time, user and system, of all threads, and of children that were waited
+    /// for.
     pub processor_s: f64,
     /// Of the process, or of it and its children together when there are any.
     pub peak_bytes: f64,
@@ -35,7 +36,8 @@ impl Run {
         let since = Instant::now();
         let mut child = command.spawn().map_err(|error| format!("{command:?}: {error}"))?;
         let mut peaks = HashMap::new();
-        // A process that has ended keeps its processor time, not its memory, until it is waited for.
+        // A process that has ended keeps its processor time, not its memory, until it is waited
+        // for.
         while !has_ended(&child) {
             note_peaks(child.id(), &mut peaks);
             sleep(POLL);

@@ -174,7 +174,8 @@ impl Product {
         self.export(source, marked, options)
     }
 
-    /// Marks `source` on export to a GeoPackage with these options of the driver and those of the product.
+    /// Marks `source` on export to a GeoPackage with these options of the driver and those of the
+    /// product.
     ///
     /// # Errors
     /// What ogr2ogr prints.

@@ -162,7 +162,8 @@ impl Marking {
         Basis::low_frequencies(&self.patches.as_slice()[number], self.carriers() + 1).expect("it converges")
     }
 
-    /// Analysis of coordinates relative to the map's centre: the r_i of the paper, which marking needs not.
+    /// Analysis of coordinates relative to the map's centre: the r_i of the paper, which marking
+    /// needs not.
     fn coordinate_spectrum(&self, basis: &Basis) -> Value {
         let local = self.reference.local(1.0);
         let axis = |axis: usize| {
@@ -229,8 +230,8 @@ fn column(basis: &Basis, i: usize) -> Vec<f64> {
     (0..basis.vectors.nrows()).map(|v| basis.vectors[(v, i)]).collect()
 }
 
-/// The spectrum of a ring of 12 vertices, whose eigenvalues 1 − cos(πk/6) occur twice each: there the
-/// basis is not the solver's to choose.
+/// The spectrum of a ring of 12 vertices, whose eigenvalues 1 − cos(πk/6) occur twice each: there
+/// the basis is not the solver's to choose.
 fn ring() -> Value {
     let mut edges: Vec<[u32; 2]> = (0..11).map(|i| [i, i + 1]).chain([[0, 11]]).collect();
     edges.sort_unstable();

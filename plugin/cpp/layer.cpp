@@ -5,7 +5,8 @@
 #include <cmath>
 #include <limits>
 
-// The interval between checks of the source's files, so that a change is detected before a writer commits.
+// The interval between checks of the source's files, so that a change is detected before a writer
+// commits.
 constexpr int FEATURES_BETWEEN_CHECKS = 256;
 // The metadata domain in which GDAL keeps members of a GeoJSON file.
 constexpr const char *NATIVE_DATA = "NATIVE_DATA";
@@ -23,7 +24,7 @@ GDALDataset *MeshmarkLayer::GetDataset()
     return &m_dataset;
 }
 
-// --- metadata: the source's, but for the unmarked extent that a GeoJSON file has in its words -----------------
+// --- metadata: the source's, but for the unmarked extent that a GeoJSON file has in its words ----
 
 static bool IsNativeData(const char *domain)
 {
@@ -67,7 +68,8 @@ OGRFeature *MeshmarkLayer::GetNextFeature()
     return nullptr;
 }
 
-// Returns the next feature of the source, marked. After a failure there is none until the next reset.
+// Returns the next feature of the source, marked. After a failure there is none until the next
+// reset.
 OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
 {
     if (m_ended)
@@ -214,7 +216,8 @@ static void SetFilter(OGRLayer &source, int field, OGRGeometry *geometry)
 }
 
 // A straight edge moves no further than its ends do, so a source's rectangle that is wider by the
-// furthest move loses no feature; PassesFilters then decides. Arcs may move further than their points.
+// furthest move loses no feature; PassesFilters then decides. Arcs may move further than their
+// points.
 void MeshmarkLayer::ApplySpatialFilterToSource()
 {
     ApplyIgnoredFieldsToSource();

@@ -2,8 +2,8 @@
  * meshmark.h: watermarking for programs that hold a GDAL dataset.
  *
  * Most programs do not need this header: they open "MESHMARK:<dataset>" with open options and read
- * the marked map. It is for programs that hold a dataset without a name by which it can be opened: a
- * dataset in memory, the result of a query, or one opened with options of its own.
+ * the marked map. It is for programs that hold a dataset without a name by which it can be opened:
+ * a dataset in memory, the result of a query, or one opened with options of its own.
  *
  *     CPLStringList options;
  *     options.SetNameValue("KEY", "key.json");
@@ -31,12 +31,12 @@ CPL_C_START
 
 /*
  * Returns a read-only dataset whose layers are those of `source` with marked geometry. The options
- * are the driver's open options (KEY, RECIPIENT or MESSAGE, AMPLITUDE, ...; `ogrinfo --format
- * MESHMARK` lists them). All vertices are read once and their new places computed before it returns;
- * features then stream.
+ * are the driver's open options (KEY, RECIPIENT or MESSAGE, AMPLITUDE, ...;
+ * `ogrinfo --format MESHMARK` lists them). All vertices are read once and their new places computed
+ * before it returns; features then stream.
  *
- * On failure it returns NULL after exactly one CPLError, whose sentence names what is wrong and what
- * to do. It never changes `source`'s data.
+ * On failure it returns NULL after exactly one CPLError, whose sentence names what is wrong and
+ * what to do. It never changes `source`'s data.
  *
  * Filters and ignored fields that are set on the layers of `source` are cleared: the whole map is
  * marked. While the result is open, read the layers through it alone: both share the one position

@@ -1,9 +1,10 @@
 //! The target of ogr2ogr, read from its command line.
 //!
-//! Writers of several files, like that of Shapefiles, append to the files of a folder without asking the
-//! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the source
-//! itself, so this is refused before anything is written. A record in the place of the output is refused too,
-//! as one would overwrite the other. Other hosts are not examined.
+//! Writers of several files, like that of Shapefiles, append to the files of a folder without
+//! a call of the driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features
+//! would go into the source itself, so this is refused before anything is written. A record in the
+//! place of the output is refused too, as one would overwrite the other. Other hosts are not
+//! examined.
 
 use crate::{
     error::{Error, Result},
@@ -35,8 +36,8 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Returns the target of ogr2ogr, if `is_accepted` accepts it. The target precedes the source; options and
-/// their values stand before and between them.
+/// Returns the target of ogr2ogr, if `is_accepted` accepts it. The target precedes the source;
+/// options and their values stand before and between them.
 fn target(arguments: &[String], is_accepted: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
     if Path::new(program).file_name()? != "ogr2ogr" {

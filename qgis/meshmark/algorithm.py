@@ -16,7 +16,7 @@ ICON = os.path.join(os.path.dirname(__file__), "icon.svg")
 
 
 class Algorithm(QgsProcessingAlgorithm):
-    """The base class: a subclass defines NAME, `title`, `about`, and the programs that it `needs`."""
+    """The base class: a subclass defines NAME, `title`, `about` and the programs it `needs`."""
 
     NAME = ""
 

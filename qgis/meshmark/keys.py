@@ -16,7 +16,7 @@ class Refused(Exception):
 
 
 def make(path):
-    """Makes a key in a new file that only its owner can read; raises Refused when the file exists."""
+    """Makes a key in a new file that only its owner can read; raises Refused if it exists."""
     finished = commands.run([commands.meshmark(), "keygen", "--", path], QgsFeedback())
     if finished.code != 0:
         errors, _ = sentences(finished.errors)

@@ -19,7 +19,10 @@ WRITERS = QgsVectorFileWriter
 
 
 class Snapshot:
-    """The content of a layer with its filter and unsaved edits: created in the main thread, read in any."""
+    """The content of a layer with its filter and unsaved edits.
+
+    It is created in the main thread and read in any.
+    """
 
     def __init__(self, layer):
         if not isinstance(layer, QgsVectorLayer):
@@ -54,7 +57,7 @@ def path_of(layer):
 
 
 def file_of(layer):
-    """Returns the file that a layer shows unchanged; None with a filter or unsaved edits, or when not local."""
+    """Returns the local file that a layer displays unchanged; None with a filter or unsaved edits."""
     if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
         return None
     return path_of(layer)

@@ -16,7 +16,7 @@ class Proof:
         self._before = identity(output)
 
     def check(self, recipient, message):
-        """Raises unless the file is new and has a reference and a record of this recipient or message."""
+        """Raises unless the file is new, with a reference and a record of this subject."""
         found = self._found()
         expected = ("recipient", recipient) if recipient else ("message", message.lower())
         is_new = identity(self._output) not in (None, self._before)

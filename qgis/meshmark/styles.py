@@ -18,7 +18,7 @@ ARROW_M = 0.003
 
 
 def displacements(layer):
-    """Returns a renderer of arrows, enlarged to a legible length at any scale; colours show the weight."""
+    """Returns a renderer of arrows, legible at any scale; colours show the weight."""
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
     exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"

@@ -171,7 +171,7 @@ def answer(finished, codes, feedback):
 
 
 def recipients(found):
-    """Returns the recipients of matching copies: several when copies were mixed, none without a match."""
+    """Returns the recipients of matching copies: several for a mixture, none without a match."""
     if found["verdict"] != "match":
         return []
     if not found["candidates"]:

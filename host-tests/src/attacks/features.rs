@@ -14,7 +14,8 @@ pub fn delete(map: &Map, share: f64, seed: u64) -> Map {
     map
 }
 
-/// Puts layers and features in random order and takes their ids away, for by id they would be sorted again.
+/// Puts layers and features in random order and takes their ids away, for by id they would be
+/// sorted again.
 pub fn scramble(map: &Map, seed: u64) -> Map {
     let mut random = Random::new(seed);
     let mut map = map.clone();

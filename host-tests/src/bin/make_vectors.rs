@@ -1,7 +1,8 @@
 //! Makes fixtures/vectors again: key, record, marked map and the intermediate values.
 //!
-//! The marked map and the record come from the driver, through ogr2ogr, as a user makes them; build it
-//! first (`make build`). Its folder is target/release/gdalplugins, or GDAL_DRIVER_PATH when that is set.
+//! The marked map and the record come from the driver, through ogr2ogr, as a user makes them; build
+//! it first (`make build`). Its folder is target/release/gdalplugins, or GDAL_DRIVER_PATH when that
+//! is set.
 
 use meshmark_host_tests::vectors::{self, Marking, RECIPIENT};
 use std::{fs, io, path::Path, process::Command};

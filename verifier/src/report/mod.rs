@@ -40,7 +40,8 @@ pub struct Report {
     pub message: Option<String>,
     /// The decoded bits themselves, hexadecimal.
     pub carried_message: Option<String>,
-    /// The message that the key whitens to these bits, hexadecimal: that of a copy marked with MESSAGE.
+    /// The message that the key whitens to these bits, hexadecimal: that of a copy marked with
+    /// MESSAGE.
     pub unwhitened_message: Option<String>,
     /// Log-likelihood ratios of these bits after decoding, natural logarithm, positive = 1.
     pub bits: Vec<f64>,
