@@ -5,9 +5,7 @@
 //! left by a killed process: the next process that writes to the same folder undoes a partial
 //! publication ([`crate::publication::recover`]) and removes the workplace.
 
-pub use crate::error::file_error;
-
-use crate::{Result, publication};
+use crate::{Result, error::file_error, publication};
 use std::{
     ffi::OsStr,
     fs::{self, File, Permissions, TryLockError},

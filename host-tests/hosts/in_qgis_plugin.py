@@ -147,7 +147,7 @@ def verify_what_a_layer_shows():
 
 
 def verify_again():
-    """The second run of a session gives equally good layers; without a match no recipient is named."""
+    """The second run of a session gives equally good layers; without a match nobody is named."""
     import processing
 
     for run, (suspect, verdict, recipient) in enumerate(
@@ -237,7 +237,7 @@ def impostor(name, *lines):
 
 
 def older_file_is_no_copy():
-    """After exit code 0 with a copy for another recipient in the place, the run fails and names it."""
+    """The run fails if ogr2ogr ends with exit code 0 and the copy is for another recipient."""
     buildings = of_map("buildings")
     export("older", [buildings])
     for_b = {"RECIPIENT": "B", "OUTPUT": f"{HERE}/older.gpkg"}

@@ -1,10 +1,12 @@
 //! Faults while a marked map is written, and what must hold afterwards.
 
-use crate::plugin::{Host, Run};
+use crate::{
+    plugin::{Host, Run},
+    process,
+};
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/faults/fault.c");
@@ -300,7 +302,5 @@ fn limited(bytes: usize) -> String {
 }
 
 fn compile(library: &Path) {
-    let arguments = ["-O1", "-shared", "-fPIC", SOURCE, "-ldl", "-o"];
-    let output = Command::new("cc").args(arguments).arg(library).output().expect("cc can be run");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    process::compile(Path::new(SOURCE), &["-O1", "-shared", "-fPIC", "-ldl"], library).unwrap();
 }

@@ -1,6 +1,6 @@
 //! The driver as a user has it: GDAL's own programs, the plugin in a folder, a key file.
 
-use crate::built;
+use crate::{built, product::marking_arguments};
 use meshmark_core::key::SecretKey;
 use std::{
     fs,
@@ -163,11 +163,12 @@ impl Host {
 
     /// `ogr2ogr -f FORMAT output MESHMARK:source` with the key, a recipient and more options.
     pub fn mark(&self, format: &str, output: &str, source: &str, options: &[&str]) -> Run {
-        let source = format!("MESHMARK:{source}");
-        let mut arguments = vec!["-f", format, output, &source];
-        arguments.extend(["-oo", "KEY=key.json", "-oo", "RECIPIENT=ACME GmbH"]);
-        arguments.extend(options);
-        self.run("ogr2ogr", &arguments)
+        let fixed = ["KEY=key.json", "RECIPIENT=ACME GmbH"].map(String::from);
+        let fixed = marking_arguments(format, output, source, fixed);
+        self.run(
+            "ogr2ogr",
+            &fixed.iter().map(String::as_str).chain(options.iter().copied()).collect::<Vec<_>>(),
+        )
     }
 }
 

@@ -1,4 +1,4 @@
-//! A process, timed, with its peak memory.
+//! Processes: one timed, with its peak memory, and the C compiler.
 
 use crate::Result;
 use serde::Serialize;
@@ -49,6 +49,19 @@ impl Run {
             return Err(format!("{command:?}: {status}\n{}", fs::read_to_string(messages)?).into());
         }
         Ok(Run { seconds, processor_s, peak_bytes: peaks.values().sum() })
+    }
+}
+
+/// Compiles a C source of a test or a benchmark into a program or a library.
+///
+/// # Errors
+/// The C compiler cannot be run, or fails: with what it printed.
+pub fn compile(source: &Path, arguments: &[&str], into: &Path) -> Result<()> {
+    let output = Command::new("cc").arg(source).args(arguments).arg("-o").arg(into).output();
+    let output = output.map_err(|error| format!("cc cannot be run: {error}"))?;
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(String::from_utf8_lossy(&output.stderr).into()),
     }
 }
 
@@ -113,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_process_is_waited_for_and_its_failure_is_told() {
+    fn a_process_is_waited_for_and_its_failure_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let shell = |script: &str, codes: &[i32]| {
             Run::of(Command::new("sh").args(["-c", script]), folder.path(), codes)

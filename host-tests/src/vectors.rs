@@ -75,7 +75,7 @@ pub fn coordinates(path: &Path) -> Vec<[f64; 2]> {
 }
 
 /// The marking of the reference, with all that it is made of.
-pub struct Marking {
+pub struct ReferenceMarking {
     /// The vertices of the reference map.
     pub reference: VertexTable,
     /// Metres on the ground.
@@ -89,7 +89,7 @@ pub struct Marking {
     patches: Patches,
 }
 
-impl Marking {
+impl ReferenceMarking {
     /// Marks the reference with today's code.
     ///
     /// # Panics
@@ -103,7 +103,7 @@ impl Marking {
         let message = key().recipient_message(RECIPIENT);
         let marked = embed(&on_ground, &key(), &message, &parameters).expect("it fits");
         let patches = Patches::new(&on_ground, &parameters).expect("it fits");
-        Marking { reference: map.data.vertices, ground, parameters, message, marked, patches }
+        ReferenceMarking { reference: map.data.vertices, ground, parameters, message, marked, patches }
     }
 
     /// Every intermediate value an implementer may want to compare, by the steps of the algorithm.
@@ -220,7 +220,7 @@ impl Marking {
     }
 }
 
-impl Default for Marking {
+impl Default for ReferenceMarking {
     fn default() -> Self {
         Self::new()
     }

@@ -265,8 +265,8 @@ fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
     map.write(&host.path("suspect.gpkg")).unwrap();
 }
 
-/// Returns the report's entry for these coordinates. EPSG:3067, the reference's own, is UTM zone 35 by
-/// another name.
+/// Returns the report's entry for these coordinates. EPSG:3067, the reference's own, is UTM zone 35
+/// by another name.
 fn read_as(epsg: u32, swapped: bool) -> Value {
     let epsg = if epsg == 32635 { 3067 } else { epsg };
     json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped })

@@ -8,9 +8,10 @@ use crate::{
 };
 use meshmark_core::options::Creation;
 use meshmark_dataset::{
+    file_error,
     formats::Format,
     same_file,
-    workplace::{Workplace, file_error, folder_of},
+    workplace::{Workplace, folder_of},
 };
 use std::{
     ffi::{OsStr, OsString},

@@ -2,7 +2,7 @@
 //! marked and published.
 //!
 //! ```text
-//! host ──layers, fields──> schema (the real driver, an empty dataset: answers what the format can do)
+//! host ──layers, fields──> schema (an empty dataset of the real driver: the capabilities)
 //!      ──features────────> staging GeoPackage, in the end the REFERENCE
 //! close: staging ──marking──> the real driver ──read_back──> publication
 //! ```
@@ -21,9 +21,9 @@ use crate::{
     target::{Places, Target},
 };
 use meshmark_dataset::{
+    file_error,
     marking::foreign_places,
     publication::{Move, Publication},
-    workplace::file_error,
 };
 use std::{fs, path::Path};
 

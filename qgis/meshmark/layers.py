@@ -57,7 +57,7 @@ def path_of(layer):
 
 
 def file_of(layer):
-    """Returns the local file that a layer displays unchanged; None with a filter or unsaved edits."""
+    """Returns the local file that a layer displays unchanged, None if it is filtered or edited."""
     if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
         return None
     return path_of(layer)
