@@ -52,12 +52,14 @@ $(BENCH_PYTHON): benches/peers/requirements.txt
 	$(BENCH_PYTHON) -m pip install --quiet -r $<
 	touch $@
 
-# The paper's Table 2 and more, on maps in metres; about an hour for the nine maps of docs/evaluation.md.
+# The paper's Table 2 and more, on maps in metres; about an hour for the nine maps of
+# docs/evaluation.md.
 table2: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin table2
 	$(BUILD)/table2 --out target/table2 $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
-# What marking does to shape and topology, with every SHAPE and BASIS; fails when anything became invalid.
+# What marking does to shape and topology, with every SHAPE and BASIS; fails when anything became
+# invalid.
 quality: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin quality
 	$(BUILD)/quality $(or $(MAPS),$(wildcard ../shared/maps/dev/*.gpkg ../shared/maps/variety/*.gpkg),$(FIXTURES))
@@ -76,9 +78,9 @@ faults: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the wheel's GDAL and one that is
-# compiled, Debian 13 with its GDAL and QGIS, the examples, the package in a clean Debian; installs what they need. Takes an
-# hour and a half the first time.
+# A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the wheel's
+# GDAL and one that is compiled, Debian 13 with its GDAL and QGIS, the examples, the package in a
+# clean Debian; installs what they need. Takes an hour and a half the first time.
 hosts: build plugin-for-wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
@@ -91,7 +93,8 @@ hosts: build plugin-for-wheel
 	host-tests/hosts/examples.sh
 	host-tests/hosts/deb.sh
 
-# How long a newcomer waits: for `make demo` on a clean machine, for the first marked file, for a report.
+# How long a newcomer waits: for `make demo` on a clean machine, for the first marked file, for a
+# report.
 newcomer:
 	host-tests/newcomer.sh
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs the Debian or Ubuntu packages that are missing, those given as arguments too. Asks for nothing when all are there.
+# Installs the Debian or Ubuntu packages that are missing, those given as arguments too. Does
+# nothing when all are there.
 set -euo pipefail
 
 packages=(g++ pkg-config gdal-bin libgdal-dev libsqlite3-dev libcgal-dev libgmp-dev "$@")

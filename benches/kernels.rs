@@ -1,8 +1,9 @@
 //! The kernels against their rivals, on one thread: `cargo bench -p meshmark-benches`.
 //!
-//! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go. LAPACK is
-//! that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not installed is left out: the
-//! packages libopenblas-dev, libcgal-dev, and what `make bench` installs for Python.
+//! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go.
+//! LAPACK is that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not
+//! installed is left out: the packages libopenblas-dev, libcgal-dev, and what `make bench` installs
+//! for Python.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::{Mat, Par, Side};
@@ -17,6 +18,7 @@ use meshmark_core::{
 };
 use meshmark_dataset::{Selection, Survey, survey};
 use meshmark_detection::matching::Matcher;
+use meshmark_host_tests::process;
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -34,7 +36,7 @@ const PROFILES: [(usize, usize); 2] = [(480, 257), (260, 257)];
 
 fn eigen_solve(criterion: &mut Criterion) {
     faer::set_global_parallelism(Par::Seq);
-    let dsyevd = compile(Path::new(DSYEVD));
+    let dsyevd = compiled_dsyevd();
     let mut group = criterion.benchmark_group("eigen-solve");
     group.sample_size(20);
     for (patch_size, columns) in PROFILES {
@@ -123,17 +125,11 @@ fn laplacian(patch: &Patch) -> Mat<f64> {
     seen.into_inner()
 }
 
-fn compile(source: &Path) -> Result<PathBuf, String> {
+fn compiled_dsyevd() -> meshmark_host_tests::Result<PathBuf> {
     let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join("dsyevd");
-    let compiler =
-        Command::new("cc").arg("-O2").arg(source).arg("-o").arg(&program).arg("-lopenblas").output();
-    let compiler = compiler.map_err(|error| format!("cc cannot be run: {error}"))?;
-    let complaint = String::from_utf8_lossy(&compiler.stderr);
-    if compiler.status.success() {
-        Ok(program)
-    } else {
-        Err(format!("is libopenblas-dev installed?\n{complaint}"))
-    }
+    process::compile(Path::new(DSYEVD), &["-O2", "-lopenblas"], &program)
+        .map_err(|error| format!("is libopenblas-dev installed?\n{error}"))?;
+    Ok(program)
 }
 
 fn time_dsyevd(program: &Path, matrix: &[f64], repetitions: u64) -> Duration {

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Writes dataset/src/projected_crs.csv from PROJ's database: which projected CRS are meant for which place.
-# usage: dataset/make_projected_crs.sh [proj.db]; needs sqlite3.
+# Writes dataset/src/projected_crs.csv from PROJ's database: which projected CRS are meant for which
+# place.
+# Usage: dataset/make_projected_crs.sh [proj.db]; needs sqlite3.
 set -euo pipefail
 
 database=${1:-$(for folder in "${PROJ_DATA:-}" /usr/share/proj /usr/local/share/proj; do

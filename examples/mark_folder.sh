@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Marks every sheet of a folder for one recipient: mark_folder.sh SHEETS KEY RECIPIENT FOLDER
-# A sheet that was marked before is left as it is, so that the script can be run again after a failure. References, which are
-# the unmarked sheets, and records go into the folder as well: hand out the copies alone.
+# A sheet that was marked before is left as it is, so that the script can be run again after a
+# failure. References, which are the unmarked sheets, and records go into the folder as well: hand
+# out the copies alone.
 set -euo pipefail
 sheets=$1 key=$2 recipient=$3 folder=$4
 

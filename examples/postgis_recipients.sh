@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Marks a table of PostGIS once for every recipient: postgis_recipients.sh CONNECTION TABLE KEY LIST FOLDER
-# LIST has one recipient per line. The reference, which is the unmarked table, and the records go into the folder as well:
-# keep them, and hand out the copies alone.
+# Marks a table of PostGIS once for every recipient:
+# postgis_recipients.sh CONNECTION TABLE KEY LIST FOLDER
+# LIST has one recipient per line. The reference, which is the unmarked table, and the records go
+# into the folder as well: keep them, and hand out the copies alone.
 set -euo pipefail
 connection=$1 table=$2 key=$3 list=$4 folder=$5
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Times a newcomer's path in clean Debians: from a clone to the end of `make demo`, from the package to the first marked
-# file, from a suspect to its report. Rust is there from the start, everything else is fetched. Installs debootstrap where
-# it is missing, and needs root, or sudo, for the clean roots.
+# Times a newcomer's path in clean Debians: from a clone to the end of `make demo`, from the package
+# to the first marked file, from a suspect to its report. Rust is there from the start, everything
+# else is fetched. Installs debootstrap where it is missing, and needs root, or sudo, for the clean
+# roots.
 # Usage: newcomer.sh
 set -euo pipefail
 

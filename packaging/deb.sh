@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Makes a Debian package of what `make build` built: driver, command, man pages, completions, documents.
+# Makes a Debian package of what `make build` built: driver, command, man pages, completions,
+# documents.
 # Usage: deb.sh BUILD_FOLDER OUTPUT_FOLDER; prints the path of the package.
 set -euo pipefail
 

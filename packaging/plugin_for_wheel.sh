@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # Builds the driver for the GDAL that a wheel of pyogrio brings along, which geopandas uses.
-# Usage: plugin_for_wheel.sh PYTHON OUTPUT_FOLDER: a Python that can import pyogrio, and where ogr_MESHMARK.so goes.
+# Usage: plugin_for_wheel.sh PYTHON OUTPUT_FOLDER: a Python that can import pyogrio, and the folder
+# for ogr_MESHMARK.so.
 set -euo pipefail
 
-# GDAL's headers, which no wheel has, are those of gdal_source.sh: its C++ interface is that of all of 3.12.
+# GDAL's headers, which no wheel has, are those of gdal_source.sh: its C++ interface is that of all
+# of 3.12.
 readonly headers_of=3.12
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -35,7 +37,8 @@ if [ ! -f "$home/include/gdal_version.h" ]; then
     "$root/packaging/gdal_source.sh" "$source"
     mkdir -p "$home/include" "$home/lib"
     cp "$source"/{port,gcore,ogr,alg,apps}/*.h "$source"/ogr/ogrsf_frmts/*.h "$home/include/"
-    # What configuring GDAL would make: types of this machine, as the system's GDAL has them, and the version.
+    # What configuring GDAL would make: types of this machine, as the system's GDAL has them, and
+    # the version.
     cp "$("${CC:-cc}" -E -xc - $(gdal-config --cflags) <<<'#include <cpl_config.h>' | sed -n 's/.*"\(.*cpl_config.h\)".*/\1/p' |
         head -n 1)" "$home/include/"
     cp "$source/gcore/gdal_version.h.in" "$home/include/gdal_version.h"

@@ -1,4 +1,5 @@
-/* Times LAPACK's dsyevd, all eigenvalues and eigenvectors of a symmetric matrix by divide and conquer.
+/* Times LAPACK's dsyevd: all eigenvalues and eigenvectors of a symmetric matrix, by divide and
+ * conquer.
  *
  * arguments: n, repetitions
  * stdin:     n × n f64, symmetric

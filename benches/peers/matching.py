@@ -1,4 +1,4 @@
-"""Times SciPy's k-d tree at what matching does: for two sets of points, each one's nearest in the other set.
+"""Times SciPy's k-d tree at matching: for two sets of points, the nearest of each in the other set.
 
 arguments: radius, repetitions
 stdin:     two sets of N points as f64 x, f64 y, one after the other

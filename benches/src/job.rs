@@ -1,4 +1,5 @@
-//! Whole jobs on one map: plain `ogr2ogr`, the same through the driver, the numpy script, verification.
+//! Whole jobs on one map: plain `ogr2ogr`, the same through the driver, the numpy script,
+//! verification.
 
 use crate::stages::Stages;
 use meshmark_core::key::SecretKey;
@@ -17,13 +18,15 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// Maps of more vertices are measured once instead of twice, without the stages and without the script.
+/// Maps of more vertices are measured once instead of twice, without the stages and without the
+/// script.
 const HUGE: usize = 1_000_000;
 
 /// Recipients of the long list.
 const MANY: usize = 9;
 
-/// Patches of half the size with one chip a bit: as many chips in the map, and a quarter of the solving.
+/// Patches of half the size with one chip a bit: as many chips in the map, and a quarter of the
+/// solving.
 const SMALL_PATCHES: [&str; 6] = ["-oo", "PATCH_SIZE=256", "-oo", "CHIP_RATE=1", "-oo", "CODE=REPETITION"];
 
 /// The programs.
@@ -180,6 +183,7 @@ impl<'a> Work<'a> {
         let mut command = self.programs.product.meshmark();
         command.stdout(File::create(self.path("report.json"))?);
         command.args(["verify", "--json", "--key", "key.json", "--recipient", "bench", "--reference"]);
-        self.run(command.arg(self.map).arg("marked.gpkg"), &[0, 1, 3]) // the exit codes of the verdicts
+        // These are the exit codes of the verdicts.
+        self.run(command.arg(self.map).arg("marked.gpkg"), &[0, 1, 3])
     }
 }

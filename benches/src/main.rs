@@ -1,9 +1,9 @@
-//! What marking and verifying cost, beside plain `ogr2ogr` and a numpy script, from thousands of vertices to millions:
-//! prints a Markdown table with a column for every map and tiling, and writes it with JSON and plots. `meshmark` and the
-//! driver are those next to this program.
+//! What marking and verifying cost, beside plain `ogr2ogr` and a numpy script, from thousands of
+//! vertices to millions: prints a Markdown table with a column for every map and tiling, and writes
+//! it with JSON and plots. `meshmark` and the driver are those next to this program.
 //!
-//! Processes run as a user runs them, in turns; stages are timed in this process. Nothing is asserted, for times depend
-//! on the machine and on what else it does.
+//! Processes run as a user runs them, in turns; stages are timed in this process. Nothing is
+//! asserted, for times depend on the machine and on what else it does.
 
 mod job;
 mod report;

@@ -146,7 +146,8 @@ fn processor_name() -> String {
     name.map_or("unknown processor".into(), |(_, name)| name.trim().into())
 }
 
-/// How many processes wanted to run in the last minute: more than threads means that times are too long.
+/// How many processes wanted to run in the last minute: more than threads means that times are too
+/// long.
 fn load() -> String {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split(' ').next().unwrap_or_default().into()

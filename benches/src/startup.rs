@@ -6,8 +6,8 @@ use std::{path::Path, process::Command};
 /// Programs started with the driver and without, in turns.
 const STARTS: usize = 60;
 
-/// How many milliseconds longer `ogrinfo --formats` takes with the drivers of `plugins` than with none: the difference of
-/// the medians.
+/// How many milliseconds longer `ogrinfo --formats` takes with the drivers of `plugins` than with
+/// none: the difference of the medians.
 ///
 /// # Errors
 /// When ogrinfo does not run.

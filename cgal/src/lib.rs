@@ -1,5 +1,5 @@
-//! CGAL's Delaunay triangulation, run as a program of its own: the oracle for our mesh. Two triangulations are compared by
-//! [`delaunay_check`].
+//! CGAL's Delaunay triangulation, run as a program of its own: the oracle for our mesh. Two
+//! triangulations are compared by [`delaunay_check`].
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,11 @@
-//! Rigid bodies: polygons that share vertices or walls move as one, shifted and turned but not bent.
+//! Rigid bodies: polygons that share vertices or walls move as one, shifted and turned but not
+//! bent.
 
 use crate::{disjoint_sets::DisjointSets, map::Map};
 use std::collections::BTreeMap;
 
-/// A group of polygons with more vertices stays free: as one body it would carry as little as one building.
+/// A group of polygons with more vertices stays free: as one body it would carry as little as one
+/// building.
 pub const MOST_VERTICES: usize = 60;
 
 /// The groups of polygons that move as one.
@@ -37,8 +39,8 @@ pub struct Motion {
 }
 
 impl Bodies {
-    /// Finds the groups of polygons of `map`. `touching` are vertices that lie on segments: a corner on the
-    /// wall of another polygon joins the two.
+    /// Finds the groups of polygons of `map`. `touching` are vertices that lie on segments: a
+    /// corner on the wall of another polygon joins the two.
     pub(crate) fn find(map: &Map, touching: impl Iterator<Item = (u32, [u32; 2])>) -> Self {
         let in_polygon = sizes(map.polygon_roots);
         let mut groups = DisjointSets::new(map.polygon_roots.len());
@@ -91,8 +93,8 @@ impl Body {
         Body { members, arms_m, scale }
     }
 
-    /// Returns the rigid motion nearest to displacements of the vertices (metres). It is linear in them, as
-    /// turns are small.
+    /// Returns the rigid motion nearest to displacements of the vertices (metres). It is linear in
+    /// them, as turns are small.
     pub(crate) fn nearest_motion(&self, displacements_m: &[[f64; 2]]) -> Motion {
         let turned =
             self.arms_m.iter().zip(displacements_m).map(|(r, d)| r[0] * d[1] - r[1] * d[0]).sum::<f64>();
@@ -100,8 +102,8 @@ impl Body {
         Motion { shift_m: mean(displacements_m), turn }
     }
 
-    /// Returns the displacement of every vertex under a motion, metres. The turn is a true rotation, not its
-    /// linear part.
+    /// Returns the displacement of every vertex under a motion, metres. The turn is a true
+    /// rotation, not its linear part.
     pub(crate) fn displacements_m(&self, motion: &Motion) -> impl Iterator<Item = [f64; 2]> {
         let (sin, versine) = (motion.turn.sin(), 2.0 * (motion.turn / 2.0).sin().powi(2));
         let [x, y] = motion.shift_m;

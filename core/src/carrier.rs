@@ -6,8 +6,8 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-/// Chips p_i = ±1. Every patch and axis has a sequence of its own: equal carriers could be averaged out of a
-/// map.
+/// Chips p_i = ±1. Every patch and axis has a sequence of its own: equal carriers could be averaged
+/// out of a map.
 pub struct Carrier {
     seed: [u8; 32],
 }
@@ -18,8 +18,8 @@ impl Carrier {
         Carrier { seed: key.chip_seed() }
     }
 
-    /// Returns `count` chips of a patch and axis (0 = x, 1 = y): the bits of ChaCha20 stream 2·patch + axis,
-    /// least significant bit of each 64-bit word first.
+    /// Returns `count` chips of a patch and axis (0 = x, 1 = y): the bits of ChaCha20 stream
+    /// 2·patch + axis, least significant bit of each 64-bit word first.
     pub fn chips(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
         let mut stream = ChaCha20Rng::from_seed(self.seed);
         stream.set_stream((2 * patch + axis) as u64);
@@ -34,8 +34,8 @@ impl Carrier {
     }
 }
 
-/// Returns the channel bit that coefficient `i` (1 … m·c) carries. Coefficient 0 is the mean and carries
-/// none.
+/// Returns the channel bit that coefficient `i` (1 … m·c) carries. Coefficient 0 is the mean and
+/// carries none.
 pub fn bit_of_coefficient(i: usize, chip_rate: usize) -> usize {
     (i - 1) / chip_rate
 }

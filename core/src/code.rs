@@ -1,10 +1,11 @@
 //! Codes: how the bits of the message become the *channel bits* that the coefficients carry.
 //!
-//! Repetition carries every message bit unchanged; the chip rate repeats it. LDPC is the code TC256 of CCSDS
-//! 231.1-O-1 (*Short Block Length LDPC Codes for TC Synchronization and Channel Coding*): 128 message bits
-//! become 256, the message first, so chip rate 1 displaces vertices as much as repetition with chip rate 2.
-//! Belief propagation and ordered statistics decode it (M. Fossorier, S. Lin, *Soft-decision decoding of
-//! linear block codes based on ordered statistics*, IEEE Transactions on Information Theory 41, 1995).
+//! Repetition carries every message bit unchanged; the chip rate repeats it. LDPC is the code TC256
+//! of CCSDS 231.1-O-1 (*Short Block Length LDPC Codes for TC Synchronization and Channel Coding*):
+//! 128 message bits become 256, the message first, so chip rate 1 displaces vertices as much as
+//! repetition with chip rate 2. Belief propagation and ordered statistics decode it (M. Fossorier,
+//! S. Lin, *Soft-decision decoding of linear block codes based on ordered statistics*, IEEE
+//! Transactions on Information Theory 41, 1995).
 
 pub use crate::options::Code;
 
@@ -24,9 +25,9 @@ const N: usize = LDPC_CHANNEL_BITS;
 const K: usize = LDPC_MESSAGE_BITS;
 /// Belief propagation converges within a few dozen rounds or never.
 const MOST_ROUNDS: usize = 100;
-/// The order: this many bits of the most reliable basis may be wrong. Where repetition with the same
-/// displacement has 4.8 % wrong bits, belief propagation reads 46 % of the messages, order 2 reads 68 % and
-/// order 3 reads 81 %.
+/// The order: this many bits of the most reliable basis may be wrong. Where repetition with the
+/// same displacement has 4.8 % wrong bits, belief propagation reads 46 % of the messages, order 2
+/// reads 68 % and order 3 reads 81 %.
 const ORDER: usize = 3;
 
 /// The decoder that read the message.
@@ -46,12 +47,12 @@ pub enum Decoder {
 pub struct Decoded {
     /// The most likely message that was found.
     pub message: Message,
-    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1. With LDPC they compare the best
-    /// code word with this bit, the best one without it, and the expected likelihood of the code words that
-    /// were not examined. The smallest ratio bounds the trust in the message.
+    /// Log-likelihood ratios of its bits, natural logarithm, positive = 1. With LDPC they compare
+    /// the best code word with this bit, the best one without it, and the expected likelihood of
+    /// the code words that were not examined. The smallest ratio bounds the trust in the message.
     pub message_llrs: Vec<f64>,
-    /// Whether belief propagation reached a word that passes all parity checks, which noise alone almost
-    /// never does; `None` for repetition, which has no checks.
+    /// Whether belief propagation reached a word that passes all parity checks, which noise alone
+    /// almost never does; `None` for repetition, which has no checks.
     pub parity_holds: Option<bool>,
     /// The decoder that found the message.
     pub decoder: Decoder,
@@ -80,8 +81,8 @@ impl Code {
         }
     }
 
-    /// Decodes the message from log-likelihood ratios of channel bits, positive = 1. The result depends on
-    /// them alone.
+    /// Decodes the message from log-likelihood ratios of channel bits, positive = 1. The result
+    /// depends on them alone.
     ///
     /// # Panics
     /// Panics when LDPC is given other than 256 of them.
@@ -117,10 +118,10 @@ fn decode_ldpc(llrs: &[f64]) -> Decoded {
     }
 }
 
-/// Returns ln of the summed likelihoods of all code words, as if they were drawn at random, on the scale
-/// where a word of distance w has e⁻ʷ (J. Feng, K. Duffy, M. Médard, *Leveraging code structure to improve
-/// soft output for GRAND, GCD, OSD, and SCL*, arXiv 2503.16677, 2025). The near words that were examined
-/// count twice, which errs on the safe side.
+/// Returns ln of the summed likelihoods of all code words, as if they were drawn at random, on the
+/// scale where a word of distance w has e⁻ʷ (J. Feng, K. Duffy, M. Médard, *Leveraging code
+/// structure to improve soft output for GRAND, GCD, OSD, and SCL*, arXiv 2503.16677, 2025). The
+/// near words that were examined count twice, which errs on the safe side.
 fn log_likelihood_of_unseen(llrs: &[f64]) -> f64 {
     let mean = |llr: &f64| (-llr.abs()).exp().ln_1p() - 2f64.ln();
     K as f64 * 2f64.ln() + llrs.iter().map(mean).sum::<f64>()
@@ -144,7 +145,8 @@ fn believe(llrs: &[f64]) -> Option<Word> {
 
 /// The search for code words near the received word, which starts from the most reliable bits.
 struct Search {
-    /// A basis of the code: row i alone has a 1 at the i-th of the K most reliable independent places.
+    /// A basis of the code: row i alone has a 1 at the i-th of the K most reliable independent
+    /// places.
     rows: Vec<Word>,
     /// |llr| at those places, descending.
     costs: Vec<f64>,
@@ -156,7 +158,8 @@ struct Search {
     weights: Vec<[f64; 256]>,
     /// The distance of the nearest code word so far, and that word.
     best: (f64, Word),
-    /// The distance of the nearest code word whose message bit j is 0, and of the one where it is 1.
+    /// The distance of the nearest code word whose message bit j is 0, and of the one where it is
+    /// 1.
     least: [[f64; K]; 2],
     /// The largest of these distances: words further away do not matter.
     relevant: f64,
@@ -165,7 +168,8 @@ struct Search {
 impl Search {
     fn new(llrs: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..N).collect();
-        order.sort_by(|&a, &b| llrs[b].abs().total_cmp(&llrs[a].abs())); // stable, so without a choice
+        // The sort is stable, so ties leave no choice.
+        order.sort_by(|&a, &b| llrs[b].abs().total_cmp(&llrs[a].abs()));
         let unit = |i: usize| Word::encode(&std::array::from_fn::<bool, K, _>(|j| j == i));
         let mut rows: Vec<Word> = (0..K).map(unit).collect();
         let mut basis = Vec::with_capacity(K);
@@ -201,8 +205,8 @@ impl Search {
         }
     }
 
-    /// Examines every code word that differs from the start in at most `order` places of the basis, and one
-    /// more word.
+    /// Examines every code word that differs from the start in at most `order` places of the basis,
+    /// and one more word.
     fn all(&mut self, order: usize, more: Option<&Word>) {
         self.look_at(self.start);
         if let Some(word) = more {
@@ -211,9 +215,9 @@ impl Search {
         self.around(self.start, 0.0, K, order);
     }
 
-    /// Flips up to `flips` of the first `end` places of the basis, from the least reliable on. A word is at
-    /// least as far away as its flipped places cost, so words that are too far already are skipped without
-    /// loss.
+    /// Flips up to `flips` of the first `end` places of the basis, from the least reliable on. A
+    /// word is at least as far away as its flipped places cost, so words that are too far already
+    /// are skipped without loss.
     fn around(&mut self, word: Word, cost: f64, end: usize, flips: usize) {
         for row in (0..if flips == 0 { 0 } else { end }).rev() {
             let cost = cost + self.costs[row];
@@ -363,7 +367,8 @@ mod tests {
         let (mut repeated, mut coded, mut by_statistics) = (0, 0, 0);
         for _ in 0..200 {
             let message = random.message();
-            let received = random.received(&Code::Ldpc.encode(&message), 0.75); // 9 % of the signs are wrong
+            // 9 % of the signs are wrong.
+            let received = random.received(&Code::Ldpc.encode(&message), 0.75);
             let decoded = Code::Ldpc.decode(&received);
             coded += usize::from(decoded.message == message);
             by_statistics += usize::from(decoded.message == message && decoded.parity_holds == Some(false));
@@ -403,8 +408,8 @@ mod tests {
         assert!(decoded.message_llrs.iter().all(|llr| llr.abs() < 1e-9));
     }
 
-    /// Returns the columns of the generator: bit i of a random code word is the product of the message with
-    /// column i.
+    /// Returns the columns of the generator: bit i of a random code word is the product of the
+    /// message with column i.
     fn columns() -> Vec<u128> {
         let unit = |i: usize| Word::encode(&std::array::from_fn::<bool, K, _>(|j| j == i));
         let rows: Vec<Word> = (0..K).map(unit).collect();

@@ -1,5 +1,6 @@
-//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid, bodies. All of them are
-//! linear in the displacements and follow from the reference alone, so that the verifier repeats them.
+//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid, bodies. All of
+//! them are linear in the displacements and follow from the reference alone, so that the verifier
+//! repeats them.
 
 use crate::{
     bodies::Bodies,

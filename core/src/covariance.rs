@@ -1,5 +1,5 @@
-//! The covariance of displacements besides the mark: a smooth deformation, shifts of patches and of polygon groups,
-//! and noise.
+//! The covariance of displacements besides the mark: a smooth deformation, shifts of patches and of
+//! polygon groups, and noise.
 
 use crate::patches::{ALONE, Patch, Patches};
 use faer::{
@@ -48,8 +48,8 @@ impl Deformation {
         if a == b && a != ALONE { self.group_shift_m.powi(2) } else { 0.0 }
     }
 
-    /// Returns the covariance of deformation, shifts and noise over found vertices, o × o. Only its lower
-    /// triangle is filled, as the factorisation reads no more; weights divide the noise.
+    /// Returns the covariance of deformation, shifts and noise over found vertices, o × o. Only its
+    /// lower triangle is filled, as the factorisation reads no more; weights divide the noise.
     pub(crate) fn matrix(&self, at: &[Place], weights: &[f64]) -> Mat<f64> {
         Mat::from_fn(at.len(), at.len(), |i, j| {
             if i < j {
@@ -81,8 +81,8 @@ impl Place {
 pub(crate) enum Covariance {
     /// The Cholesky factor.
     Dense(Llt<f64>),
-    /// Without a deformation Σ = P⁻¹ + s² 1 1ᵀ, where the diagonal P holds these precisions and needs no
-    /// factorisation.
+    /// Without a deformation Σ = P⁻¹ + s² 1 1ᵀ, where the diagonal P holds these precisions and
+    /// needs no factorisation.
     Shift(Vec<f64>),
 }
 

@@ -1,10 +1,11 @@
-//! The disturbance of the suspect besides the mark, estimated without the key: a smooth deformation (rubber
-//! sheeting, digitising, a wrong projection) and noise. The method is kriging of the displacements.
+//! The disturbance of the suspect besides the mark, estimated without the key: a smooth deformation
+//! (rubber sheeting, digitising, a wrong projection) and noise. The method is kriging of the
+//! displacements.
 //!
-//! The displacement of a vertex is deformation + mark + noise. The deformation is a Gaussian process with a
-//! Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 4.17)
-//! and a free shift of every patch. The estimate does not depend on the chips: it is the same for the tested
-//! key and for every decoy.
+//! The displacement of a vertex is deformation + mark + noise. The deformation is a Gaussian
+//! process with a Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine
+//! Learning*, 2006, eq. 4.17) and a free shift of every patch. The estimate does not depend on the
+//! chips: it is the same for the tested key and for every decoy.
 
 pub use crate::covariance::Deformation;
 
@@ -20,7 +21,8 @@ use crate::{
 use faer::{Mat, linalg::solvers::Solve};
 use rayon::prelude::*;
 
-/// Displacement of every reference vertex in canonical order, metres, or `None` where it was not found.
+/// Displacement of every reference vertex in canonical order, metres, or `None` where it was not
+/// found.
 pub type Observed = [Option<[f64; 2]>];
 
 /// No displacement is trusted to better than this, metres.
@@ -34,8 +36,8 @@ const LEAST_FOUND: usize = 30;
 const HUBER: f64 = 2.0;
 /// A residual of more standard deviations than this is no displacement of the vertex at all.
 const OUTLIER: f64 = 4.0;
-/// The law of the noise is estimated from residuals, which show it only where the noise is this many times
-/// the mark.
+/// The law of the noise is estimated from residuals, which show it only where the noise is this
+/// many times the mark.
 const WEAK_MARK: f64 = 1.5;
 /// A deformation is accepted when it raises the log-likelihood by this much.
 const WORTH_IT: f64 = 10.0;
@@ -52,14 +54,15 @@ pub struct Prediction {
     pub deformation: Deformation,
     /// The deformation at every reference vertex in canonical order, found or not, metres.
     pub displacement_m: Vec<[f64; 2]>,
-    /// The weight of every reference vertex: 1, or less where its displacement disagrees with the others.
+    /// The weight of every reference vertex: 1, or less where its displacement disagrees with the
+    /// others.
     pub weights: Vec<f64>,
 }
 
 impl Prediction {
-    /// Removes from `observed` the displacements that are neither deformation nor mark nor noise: those of
-    /// vertices that a cut or an edit made where no reference vertex went. The scale is the median residual,
-    /// which a few such vertices do not change, and at least that of the mark.
+    /// Removes from `observed` the displacements that are neither deformation nor mark nor noise:
+    /// those of vertices that a cut or an edit made where no reference vertex went. The scale is
+    /// the median residual, which a few such vertices do not change, and at least that of the mark.
     pub fn without_outliers(&self, observed: &Observed, mark_m: f64) -> Vec<Option<[f64; 2]>> {
         let rest =
             |(o, f): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [(o[0] - f[0]).abs(), (o[1] - f[1]).abs()]);
@@ -75,8 +78,8 @@ impl Prediction {
         observed.iter().zip(&rests).map(|(o, r)| o.filter(|_| fits(r))).collect()
     }
 
-    /// Returns what to demodulate in place of `observed`: the residual of every displacement is transformed
-    /// by the fitted [`NoiseLaw`], and the noise is that of the transformed residuals.
+    /// Returns what to demodulate in place of `observed`: the residual of every displacement is
+    /// transformed by the fitted [`NoiseLaw`], and the noise is that of the transformed residuals.
     pub fn shape_noise(
         mut self,
         patches: &Patches,
@@ -102,16 +105,16 @@ impl Prediction {
     }
 }
 
-/// Returns the standard deviation of the mark's displacement on one axis, metres: unit columns of E spread over
-/// n rows.
+/// Returns the standard deviation of the mark's displacement on one axis, metres: unit columns of E
+/// spread over n rows.
 pub fn mark_deviation_m(patches: &Patches, carriers: usize, amplitude_m: f64) -> f64 {
     let per_vertex = (carriers * patches.as_slice().len()) as f64 / patches.vertex_count() as f64;
     amplitude_m * per_vertex.sqrt()
 }
 
 impl Deformation {
-    /// Returns the hyper-parameters of greatest marginal likelihood on a few patches. The mark enters with
-    /// its covariance over all chips and messages, α² E Eᵀ. `carriers` is the result of
+    /// Returns the hyper-parameters of greatest marginal likelihood on a few patches. The mark
+    /// enters with its covariance over all chips and messages, α² E Eᵀ. `carriers` is the result of
     /// [`Patches::carriers`].
     ///
     /// # Errors
@@ -134,8 +137,8 @@ impl Deformation {
         }))
     }
 
-    /// Predicts the deformation from the observed displacements. The mark counts as noise here, so no
-    /// spectrum is needed.
+    /// Predicts the deformation from the observed displacements. The mark counts as noise here, so
+    /// no spectrum is needed.
     pub fn predict(
         &self,
         patches: &Patches,
@@ -184,7 +187,8 @@ struct PatchPrediction {
 }
 
 impl Kriging {
-    /// Alternates between estimating the deformation and reducing the weights of vertices that do not fit it.
+    /// Alternates between estimating the deformation and reducing the weights of vertices that do
+    /// not fit it.
     fn new(deformation: Deformation, found: Found) -> Self {
         let mut weights = vec![1.0; found.rows.len()];
         let mut solved = Mat::zeros(found.rows.len(), 2);
@@ -246,7 +250,8 @@ impl Sample {
         parameters: &Parameters,
     ) -> Result<Self> {
         let mut found = Found::new(patches, patch, observed);
-        found.rows.truncate(SAMPLE_VERTICES); // neighbours in x: short distances are what ℓ is read from
+        // Neighbours in x remain, as short distances determine ℓ.
+        found.rows.truncate(SAMPLE_VERTICES);
         found.at.truncate(SAMPLE_VERTICES);
         let basis = Basis::low_frequencies(patch, carriers + 1)?;
         let count = found.rows.len();
@@ -267,8 +272,8 @@ impl Sample {
     }
 }
 
-/// Finds the maximum by coordinate ascent over the grid of values: with a deformation and without one, then with
-/// shifts of polygon groups.
+/// Finds the maximum by coordinate ascent over the grid of values: with a deformation and without
+/// one, then with shifts of polygon groups.
 fn most_likely(log_likelihood: impl Fn(&Deformation) -> f64) -> Deformation {
     let best_of = |candidates: &mut dyn Iterator<Item = Deformation>| {
         let scored = candidates.map(|candidate| (log_likelihood(&candidate), candidate));

@@ -1,8 +1,10 @@
-//! Demodulation: observed displacements become the message again (paper, section 3.5, and our extension).
+//! Demodulation: observed displacements become the message again (paper, section 3.5, and our
+//! extension).
 //!
-//! Both demodulators reduce a suspect to the same evidence: a correlation a_i with every chip. Under a wrong
-//! key the chips are independent random signs, so Σ p_i b′_i a_i has mean 0 and variance Σ a_i² *given the
-//! suspect*, whatever the attack: [`Demodulation::mark_score`] needs no model of it.
+//! Both demodulators reduce a suspect to the same evidence: a correlation a_i with every chip.
+//! Under a wrong key the chips are independent random signs, so Σ p_i b′_i a_i has mean 0 and
+//! variance Σ a_i² *given the suspect*, whatever the attack: [`Demodulation::mark_score`] needs no
+//! model of it.
 
 use crate::{
     Result,
@@ -26,7 +28,7 @@ use rayon::prelude::*;
 /// Correlations with chips spread by this at least, metres.
 const LEAST_SPREAD_M: f64 = 1e-3;
 
-/// What a demodulator found about the channel bits, which the code makes of the message.
+/// The result of a demodulator: estimates of the channel bits, which the code makes of the message.
 #[derive(Debug, Clone)]
 pub struct Demodulation {
     /// How the message became the channel bits.
@@ -46,7 +48,8 @@ pub struct Demodulation {
 }
 
 impl Demodulation {
-    /// Returns the log-likelihood ratios of the channel bits, 2 b̂_j / v_j, natural logarithm, positive = 1.
+    /// Returns the log-likelihood ratios of the channel bits, 2 b̂_j / v_j, natural logarithm,
+    /// positive = 1.
     pub fn log_likelihood_ratios(&self) -> Vec<f64> {
         self.estimate.iter().zip(&self.variance).map(|(b, v)| 2.0 * b / v).collect()
     }
@@ -67,8 +70,8 @@ impl Demodulation {
         signs.iter().zip(&self.estimate).filter(|(sign, b)| (**sign > 0.0) != (**b > 0.0)).count()
     }
 
-    /// Returns by how many standard deviations the evidence for this message under this key exceeds that of a
-    /// random key on the same suspect.
+    /// Returns by how many standard deviations the evidence for this message under this key exceeds
+    /// that of a random key on the same suspect.
     pub fn mark_score(&self, message: &Message) -> f64 {
         ratio(dot(&self.code.encode(message), &self.scores), self.null_deviation())
     }
@@ -78,19 +81,20 @@ impl Demodulation {
         ratio(self.expected_sum, self.null_deviation())
     }
 
-    /// Returns by how many standard deviations the estimate agrees better with this message than with a
-    /// random message under the same key: Σ w_j b′_j b̂_j / |w b̂| over channel bits, at most the square root
-    /// of their number. Its mean is 0 and its variance 1 with either code: the bits of a random LDPC code
-    /// word are not all independent, but any four of them are (a test in `code.rs` shows that the dual
-    /// distance is more than 4). On a clean copy all |b̂_j| are equal: without the weights w_j the score
-    /// would have few values, at which the tail of the normal law is up to 1.5 times too small.
+    /// Returns by how many standard deviations the estimate agrees better with this message than
+    /// with a random message under the same key: Σ w_j b′_j b̂_j / |w b̂| over channel bits, at
+    /// most the square root of their number. Its mean is 0 and its variance 1 with either code: the
+    /// bits of a random LDPC code word are not all independent, but any four of them are (a test in
+    /// `code.rs` shows that the dual distance is more than 4). On a clean copy all |b̂_j| are
+    /// equal: without the weights w_j the score would have few values, at which the tail of the
+    /// normal law is up to 1.5 times too small.
     pub fn recipient_score(&self, message: &Message) -> f64 {
         let weighted: Vec<f64> = self.estimate.iter().enumerate().map(|(j, b)| spread(j) * b).collect();
         ratio(dot(&self.code.encode(message), &weighted), dot(&weighted, &weighted).sqrt())
     }
 
-    /// Returns the [`Self::mark_score`] of each of `patches` patches alone; `None` where no displacement was
-    /// observed.
+    /// Returns the [`Self::mark_score`] of each of `patches` patches alone; `None` where no
+    /// displacement was observed.
     pub fn patch_scores(&self, carrier: &Carrier, message: &Message, patches: usize) -> Vec<Option<f64>> {
         let signs = self.code.encode(message);
         let carriers = self.chip_correlations.len() / patches / 2;
@@ -110,8 +114,8 @@ impl Demodulation {
         self.chip_correlations.par_chunks(2 * carriers).enumerate().map(score).collect()
     }
 
-    /// Returns the [`Self::mark_score`] of `count` decoy keys on the same suspect. Random signs replace the
-    /// chips; decoy k takes them from ChaCha20 stream k.
+    /// Returns the [`Self::mark_score`] of `count` decoy keys on the same suspect. Random signs
+    /// replace the chips; decoy k takes them from ChaCha20 stream k.
     pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
         let deviation = self.null_deviation();
         let score = |decoy: usize| {
@@ -127,9 +131,9 @@ impl Demodulation {
         (0..count).into_par_iter().map(score).collect()
     }
 
-    /// Returns Σ_j q_j² / n_j, where n_j = Σ a_i² over the chips of channel bit j, and the number of bits in
-    /// the sum. For a key that was not used the sum is chi-squared with that many degrees of freedom; any
-    /// message raises it.
+    /// Returns Σ_j q_j² / n_j, where n_j = Σ a_i² over the chips of channel bit j, and the number
+    /// of bits in the sum. For a key that was not used the sum is chi-squared with that many
+    /// degrees of freedom; any message raises it.
     pub fn key_score(&self, chip_rate: usize) -> (f64, usize) {
         let bits = self.scores.len();
         let mut energy = vec![0.0; bits];
@@ -147,9 +151,9 @@ impl Demodulation {
     }
 }
 
-/// Returns a weight between 3/4 and 5/4; multiples of the golden ratio keep the weights as different as
-/// possible. Their deviation of 0.14 blurs the steps of 1/4 between scores of LDPC code words and costs 1 %
-/// of the score.
+/// Returns a weight between 3/4 and 5/4; multiples of the golden ratio keep the weights as
+/// different as possible. Their deviation of 0.14 blurs the steps of 1/4 between scores of LDPC
+/// code words and costs 1 % of the score.
 fn spread(j: usize) -> f64 {
     0.75 + 0.5 * ((j as f64 * 0.618_033_988_749_895).fract())
 }
@@ -162,14 +166,14 @@ fn ratio(a: f64, b: f64) -> f64 {
     if b > 0.0 { a / b } else { 0.0 }
 }
 
-/// Demodulates as the paper does: a vertex that is not found counts as unmoved, the dual basis gives the
-/// coefficients, and the chips of a bit are summed over axes and patches.
+/// Demodulates as the paper does: a vertex that is not found counts as unmoved, the dual basis
+/// gives the coefficients, and the chips of a bit are summed over axes and patches.
 ///
-/// `observed` holds the displacement of every reference vertex in canonical order, metres, or `None`;
-/// `bits` is the length of the message; `progress` is called once for every patch.
+/// `observed` holds the displacement of every reference vertex in canonical order, metres, or
+/// `None`; `bits` is the length of the message; `progress` is called once for every patch.
 ///
 /// # Errors
-/// Those of [`Patches::carriers`] when the message does not fit.
+/// Returns the errors of [`Patches::carriers`] when the message does not fit.
 pub fn paper(
     patches: &Patches,
     carrier: &Carrier,
@@ -202,8 +206,8 @@ pub fn paper(
     Ok(paper_estimate(&job, sums))
 }
 
-/// Estimates b̂_j as q_j over its value for a complete mark, and its variance from the spread of the a_i
-/// around their mean size.
+/// Estimates b̂_j as q_j over its value for a complete mark, and its variance from the spread of
+/// the a_i around their mean size.
 fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     let gain = |j: usize| job.parameters.amplitude_m * sums.gram[(j, 0)];
     let estimate: Vec<f64> = (0..job.bits).map(|j| ratio(sums.scores[j], gain(j))).collect();
@@ -225,10 +229,10 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     }
 }
 
-/// Demodulates all bits at once over the found vertices: y_o = S_o b + f_o + ε with signatures S = α E
-/// diag(p) C, and with the smooth deformation f and noise ε of `disturbance`. Vertices that were not found
-/// are erasures. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over patches and axes: b̂ = (G +
-/// I)⁻¹ h, v = diag (G + I)⁻¹.
+/// Demodulates all bits at once over the found vertices: y_o = S_o b + f_o + ε with signatures
+/// S = α E diag(p) C, and with the smooth deformation f and noise ε of `disturbance`. Vertices that
+/// were not found are erasures. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over
+/// patches and axes: b̂ = (G + I)⁻¹ h, v = diag (G + I)⁻¹.
 ///
 /// The other arguments and the errors are those of [`paper`].
 pub fn joint(
@@ -374,8 +378,8 @@ impl<'a> Job<'a> {
         bit_of_coefficient(i + 1, self.parameters.chip_rate)
     }
 
-    /// Returns the lower triangle of Cᵀ diag(p) K diag(p) C, m × m, from the kernel K of both axes, 2·m·c ×
-    /// 2·m·c.
+    /// Returns the lower triangle of Cᵀ diag(p) K diag(p) C, m × m, from the kernel K of both axes,
+    /// 2·m·c × 2·m·c.
     fn fold(&self, kernel: &Kernel, chips: &[Vec<f64>; 2]) -> Mat<f64> {
         let mut gram = Mat::zeros(self.bits, self.bits);
         // Two chips of one bit meet on the diagonal, once from either side of the diagonal of K.
@@ -400,9 +404,9 @@ impl<'a> Job<'a> {
         gram
     }
 
-    /// Sums `f(patch, basis, found vertices, chips)` over the patches. The size of the blocks in which they
-    /// are added depends on the number of patches alone, so the sum is the same for any number of threads,
-    /// and no matrix is held for every patch.
+    /// Sums `f(patch, basis, found vertices, chips)` over the patches. The size of the blocks in
+    /// which they are added depends on the number of patches alone, so the sum is the same for any
+    /// number of threads, and no matrix is held for every patch.
     fn sum_over_patches(
         &self,
         f: impl Fn(&Patch, &Basis, &Found, &[Vec<f64>; 2]) -> Sums + Sync,
@@ -459,8 +463,8 @@ mod tests {
         let message = Message::from_hex("a5").unwrap();
         let carrier = Carrier::new(&crate::key::SecretKey::from_bytes([3; 32]));
         let signs = message.signs();
-        // 8 bits of 2 chips: the first patch carries the mark, the second its opposite, and no vertex of the
-        // third was found.
+        // 8 bits of 2 chips: the first patch carries the mark, the second its opposite, and no
+        // vertex of the third was found.
         let patch = |(patch, size): (usize, f64)| {
             let chips = [0, 1].map(|axis| carrier.chips(patch, axis, 16)).concat();
             chips.into_iter().enumerate().map(|(i, chip)| size * chip * signs[i % 16 / 2]).collect::<Vec<_>>()
@@ -481,7 +485,8 @@ mod tests {
         assert_ne!(scores[..10], found().decoy_scores(10, [6; 32]));
         let mean = scores.iter().sum::<f64>() / 1e4;
         let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / 1e4;
-        assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.07, "{mean} {variance}"); // 5 deviations
+        // The limits are 5 deviations.
+        assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.07, "{mean} {variance}");
         let beyond = scores.iter().filter(|s| **s > 1.644_854).count();
         assert!((390..610).contains(&beyond), "{beyond} instead of 500");
     }

@@ -1,4 +1,4 @@
-//! Figures of what marking does to a map.
+//! The effect of marking on a map, in figures.
 
 use crate::{map::Map, scale::Measure, vertices::VertexTable};
 use rayon::prelude::*;
@@ -55,7 +55,7 @@ pub struct Areas {
     pub max_change: f64,
 }
 
-/// Geometries that GEOS calls invalid.
+/// Geometries that are invalid according to GEOS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Validity {
@@ -67,7 +67,8 @@ pub struct Validity {
     pub newly_invalid: usize,
 }
 
-/// Pairs of polygons that overlap by more than a sliver: 1e-6 m², or a cell of the output grid if there is one.
+/// Pairs of polygons that overlap by more than a sliver: 1e-6 m², or a cell of the output grid if
+/// there is one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Overlaps {
@@ -152,8 +153,8 @@ pub struct Corner {
 }
 
 impl Corner {
-    /// Returns all corners of a map whose vertices are at `moved` after marking, without those at a segment
-    /// of no length.
+    /// Returns all corners of a map whose vertices are at `moved` after marking, without those at a
+    /// segment of no length.
     pub fn all(map: &Map, moved: &[[f64; 2]]) -> Vec<Self> {
         let mut ends: Vec<[u32; 2]> = map.segments.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
         ends.par_sort_unstable();
@@ -178,8 +179,8 @@ impl Corner {
     }
 }
 
-/// Returns the angle from the segment back to the segment on, turning left, degrees from 0 to 360; `scale` is
-/// metres per unit. It is `None` where either segment has no length.
+/// Returns the angle from the segment back to the segment on, turning left, degrees from 0 to 360;
+/// `scale` is metres per unit. It is `None` where either segment has no length.
 fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Option<f64> {
     let direction = |p: [f64; 2]| {
         let [x, y] = [0, 1].map(|i| (p[i] - at[i]) * scale[i]);

@@ -36,19 +36,20 @@ pub struct Marked {
     pub attenuated: usize,
 }
 
-/// The message is read back from this many patches, which are solved again; from all patches only if that
-/// fails.
+/// The message is read back from this many patches, which are solved again; from all patches only
+/// if that fails.
 const READ_BACK_PATCHES: usize = 16;
 
-/// The memory for the wanted displacements of a batch of messages, bytes: 16 for each vertex and message.
+/// The memory for the wanted displacements of a batch of messages, bytes: 16 for each vertex and
+/// message.
 const MOST_BATCH_BYTES: usize = 512 << 20;
 
-/// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch. T-junctions stay, no vertex passes through a
-/// segment, and every vertex stays within the tolerance and on the output grid. The message is read back from
-/// the result before it is returned.
+/// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch. T-junctions stay, no vertex passes
+/// through a segment, and every vertex stays within the tolerance and on the output grid. The
+/// message is read back from the result before it is returned.
 ///
 /// # Errors
-/// Those of [`Embedding::new`] and [`Embedding::settle`].
+/// Returns the errors of [`Embedding::new`] and [`Embedding::settle`].
 pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Parameters) -> Result<Marked> {
     let embedding = Embedding::new(map, key, message.len(), parameters)?;
     let wanted = embedding.wanted(std::slice::from_ref(message), &|_| ())?;
@@ -72,7 +73,8 @@ impl<'a> Embedding<'a> {
     /// Meshes the map and cuts it into patches, for messages of `bits` bits.
     ///
     /// # Errors
-    /// Those of [`Patches::new`] and [`Patches::carriers`], and [`Error::PrecisionTooCoarse`].
+    /// Returns the errors of [`Patches::new`] and [`Patches::carriers`], and
+    /// [`Error::PrecisionTooCoarse`].
     pub fn new(
         map: &'a Map<'a>,
         key: &SecretKey,
@@ -87,11 +89,11 @@ impl<'a> Embedding<'a> {
         Ok(Embedding { map, placement, tree, patches, bases, carrier, carriers, parameters })
     }
 
-    /// Prepares for many messages: it solves once for the bases of the patches from which each message is
-    /// read back, and keeps them.
+    /// Prepares for many messages: it solves once for the bases of the patches from which each
+    /// message is read back, and keeps them.
     ///
     /// # Errors
-    /// A patch that cannot be solved.
+    /// Fails on a patch that cannot be solved.
     pub fn for_many(mut self) -> Result<Self> {
         let first = self.patches.as_slice().par_iter().take(READ_BACK_PATCHES);
         let bases = first.map(|patch| Basis::low_frequencies(patch, self.carriers + 1));
@@ -109,12 +111,12 @@ impl<'a> Embedding<'a> {
         (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * self.map.vertices.len())).max(1)
     }
 
-    /// Returns the displacements that are the marks, for every message those of all vertices, CRS units.
-    /// Every patch is solved once for all messages, and its basis is not kept. `progress` is called once for
-    /// every patch.
+    /// Returns the displacements that are the marks, for every message those of all vertices, CRS
+    /// units. Every patch is solved once for all messages, and its basis is not kept. `progress` is
+    /// called once for every patch.
     ///
     /// # Errors
-    /// A patch that cannot be solved.
+    /// Fails on a patch that cannot be solved.
     pub fn wanted(
         &self,
         messages: &[Message],
@@ -143,7 +145,8 @@ impl<'a> Embedding<'a> {
         Ok(wanted)
     }
 
-    /// Returns the displacements of the vertices of a patch for the signs b′ of every message, CRS units.
+    /// Returns the displacements of the vertices of a patch for the signs b′ of every message, CRS
+    /// units.
     fn wanted_of_patch(
         &self,
         number: usize,
@@ -193,8 +196,8 @@ impl<'a> Embedding<'a> {
         [0, 1].map(|axis| self.carrier.chips(patch, axis, self.carriers))
     }
 
-    /// Returns the coefficients that modulate the message: 0 for the mean, then α p_i b′_j, amplified by
-    /// `gain`.
+    /// Returns the coefficients that modulate the message: 0 for the mean, then α p_i b′_j,
+    /// amplified by `gain`.
     fn coefficients(&self, chips: &[f64], signs: &[f64], gain: f64) -> Vec<f64> {
         let chip_rate = self.parameters.chip_rate;
         let modulated = chips.iter().enumerate().map(|(i, chip)| {
@@ -203,9 +206,10 @@ impl<'a> Embedding<'a> {
         std::iter::once(0.0).chain(modulated).collect()
     }
 
-    /// Reads the message back as the verifier does by default, from as many patches as it takes: by the joint
-    /// demodulator, as the noise of the grid and of the constraints is known here. The driver reads a written file back
-    /// by [`crate::demodulation::paper`], which needs no estimate of the noise that the digits of a format add.
+    /// Reads the message back as the verifier does by default, from as many patches as it takes: by
+    /// the joint demodulator, as the noise of the grid and of the constraints is known here. The
+    /// driver reads a written file back by [`crate::demodulation::paper`], which needs no estimate
+    /// of the noise that the digits of a format add.
     fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
         let from = self.map.vertices.coords().iter();
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));

@@ -27,9 +27,9 @@ impl Ground {
         radians_per_unit: std::f64::consts::PI / 180.0,
     };
 
-    /// Returns metres per CRS unit along x and y at `point`. On the ellipsoid they follow from the radii of
-    /// curvature of the parallel (N cos φ) and of the meridian (M) (Snyder, *Map Projections*, 1987, eq. 4-18
-    /// to 4-20).
+    /// Returns metres per CRS unit along x and y at `point`. On the ellipsoid they follow from the
+    /// radii of curvature of the parallel (N cos φ) and of the meridian (M) (Snyder, *Map
+    /// Projections*, 1987, eq. 4-18 to 4-20).
     pub fn metres_per_unit(&self, point: [f64; 2]) -> [f64; 2] {
         match *self {
             Ground::Plane { metres_per_unit } => [metres_per_unit; 2],
@@ -44,8 +44,9 @@ impl Ground {
         }
     }
 
-    /// Returns the geocentric coordinates of a point of the ellipsoid, metres (EPSG method 9602); `None` in a
-    /// plane. Unlike degrees, they are continuous across the 180th meridian and at the poles.
+    /// Returns the geocentric coordinates of a point of the ellipsoid, metres (EPSG method 9602);
+    /// `None` in a plane. Unlike degrees, they are continuous across the 180th meridian and at the
+    /// poles.
     pub fn in_space(&self, point: [f64; 2]) -> Option<[f64; 3]> {
         let Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } = *self else {
             return None;
@@ -63,8 +64,9 @@ impl Ground {
         [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
     }
 
-    /// Returns the factor on x that makes both axes of the mesh coordinates about equal in scale: 1, or the
-    /// cosine of the map's middle latitude, rounded to 2⁻²⁰ so that every machine meshes the same numbers.
+    /// Returns the factor on x that makes both axes of the mesh coordinates about equal in scale:
+    /// 1, or the cosine of the map's middle latitude, rounded to 2⁻²⁰ so that every machine meshes
+    /// the same numbers.
     pub fn x_scale(&self, middle_y: f64) -> f64 {
         match self {
             Ground::Plane { .. } => 1.0,
@@ -75,8 +77,8 @@ impl Ground {
         }
     }
 
-    /// Returns whether `point` must stay in place: within `tolerance_m` of ±180° or ±90° a shift would leave
-    /// the legal range or tear a map apart at its seam.
+    /// Returns whether `point` must stay in place: within `tolerance_m` of ±180° or ±90° a shift
+    /// would leave the legal range or tear a map apart at its seam.
     pub fn is_pinned(&self, point: [f64; 2], tolerance_m: f64) -> bool {
         let Ground::Ellipsoid { radians_per_unit, .. } = self else { return false };
         let [mx, my] = self.metres_per_unit(point);
@@ -93,7 +95,8 @@ mod tests {
 
     #[test]
     fn a_degree_has_its_textbook_length() {
-        // Table 2 of Snyder 1987 holds for Clarke 1866; WGS 84 has 110.574 km at 0°, 111.694 km at 90°.
+        // Table 2 of Snyder 1987 holds for Clarke 1866; WGS 84 has 110.574 km at 0°, 111.694 km at
+        // 90°.
         let [x0, y0] = Ground::WGS84.metres_per_unit([10.0, 0.0]);
         let [x90, y90] = Ground::WGS84.metres_per_unit([10.0, 90.0]);
         assert!((x0 - 111_319.49).abs() < 0.01 && (y0 - 110_574.28).abs() < 0.01);

@@ -6,8 +6,8 @@ pub fn encode(bytes: &[u8]) -> String {
     bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }
 
-/// Decodes `text`, in either case, into `bytes` and makes no other copy; returns `None` unless the text is
-/// exactly the digits of that many bytes.
+/// Decodes `text`, in either case, into `bytes` and makes no other copy; returns `None` unless the
+/// text is exactly the digits of that many bytes.
 pub(crate) fn decode_into(text: &str, bytes: &mut [u8]) -> Option<()> {
     if text.len() != 2 * bytes.len() {
         return None;

@@ -1,8 +1,8 @@
 //! T-junctions: a vertex inside a segment hangs on it and moves with it.
 //!
-//! The constraint is linear, Δ_v = (1 − s) Δ_a + s Δ_b at the foot s of vertex v on segment ab, and depends
-//! on the reference alone: the verifier repeats it, and no part of the mark is lost. (The finite element
-//! method calls such a vertex a hanging node.)
+//! The constraint is linear, Δ_v = (1 − s) Δ_a + s Δ_b at the foot s of vertex v on segment ab, and
+//! depends on the reference alone: the verifier repeats it, and no part of the mark is lost. (The
+//! finite element method calls such a vertex a hanging node.)
 
 use crate::{
     map::Map,
@@ -11,11 +11,12 @@ use crate::{
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// A vertex within this distance of a segment lies on it, metres on the ground: rounded coordinates do not
-/// meet the segment exactly.
+/// A vertex within this distance of a segment lies on it, metres on the ground: rounded coordinates
+/// do not meet the segment exactly.
 pub const JUNCTION_M: f64 = 0.02;
 
-/// A hanging vertex keeps at most this share of its own movement; with more it hangs only on itself.
+/// A hanging vertex keeps at most this share of its own movement; with more it hangs only on
+/// itself.
 const OWN_SHARE: f64 = 1.0 - 1e-6;
 
 /// A vertex that moves as the weighted mean of others.
@@ -34,8 +35,8 @@ pub struct Junctions {
 }
 
 impl Junctions {
-    /// Hangs vertices on segments. A vertex on several segments hangs on the nearest one (the first of
-    /// equally near ones); its displacement is resolved to free vertices.
+    /// Hangs vertices on segments. A vertex on several segments hangs on the nearest one (the first
+    /// of equally near ones); its displacement is resolved to free vertices.
     pub(crate) fn new(mut touches: Vec<Touch>) -> Self {
         touches.par_sort_unstable_by(Touch::order);
         touches.dedup_by_key(|touch| touch.vertex);
@@ -52,8 +53,8 @@ impl Junctions {
         self.hanging.binary_search_by_key(&vertex, |h| h.vertex).ok().map(|i| &self.hanging[i])
     }
 
-    /// Moves the hanging vertices along with their anchors; `displacements` are those of all vertices, CRS
-    /// units.
+    /// Moves the hanging vertices along with their anchors; `displacements` are those of all
+    /// vertices, CRS units.
     pub fn follow(&self, displacements: &mut [[f64; 2]]) {
         for Hanging { vertex, anchors } in &self.hanging {
             displacements[*vertex as usize] = anchors.iter().fold([0.0; 2], |sum, &(anchor, weight)| {
@@ -104,11 +105,12 @@ fn reach(map: &Map, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 
 type Row = BTreeMap<u32, f64>;
 
-/// Resolves hanging vertices that hang on hanging vertices, or on each other (on a wall that two houses share
-/// with different vertices on either side). Gaussian elimination in canonical order leaves only free
-/// vertices.
+/// Resolves hanging vertices that hang on hanging vertices, or on each other (on a wall that two
+/// houses share with different vertices on either side). Gaussian elimination in canonical order
+/// leaves only free vertices.
 fn resolve(touches: Vec<Touch>) -> Vec<Hanging> {
-    let mut rows: BTreeMap<u32, Row> = BTreeMap::new(); // in terms of later hanging vertices and of free ones
+    // Each row is in terms of later hanging vertices and of free ones.
+    let mut rows: BTreeMap<u32, Row> = BTreeMap::new();
     for Touch { vertex, segment: [a, b], share, .. } in touches {
         let mut row = Row::new();
         let ends = [(a, 1.0 - share), (b, share)];
@@ -153,7 +155,8 @@ mod tests {
     use super::*;
     use crate::{ground::Ground, vertices::VertexTable};
 
-    /// Returns the junctions of segments between points, whose canonical indices must be their places.
+    /// Returns the junctions of segments between points, whose canonical indices must be their
+    /// places.
     fn junctions(points: &[[f64; 2]], segments: &[[u32; 2]]) -> Vec<Hanging> {
         let vertices = VertexTable::new(points.to_vec()).unwrap();
         assert_eq!(vertices.coords(), points);

@@ -13,7 +13,8 @@ const VERSION: u32 = 1;
 
 /// A key file has 150 bytes and a record a few thousand; a mistaken /dev/zero has no end.
 const LONGEST_TEXT: u64 = 1 << 20;
-/// This many bytes are reserved for a text: a buffer that grows would leave copies of a secret behind.
+/// This many bytes are reserved for a text: a buffer that grows would leave copies of a secret
+/// behind.
 const USUAL_TEXT: usize = 1024;
 
 /// Reads the text of a key file or a record.
@@ -47,7 +48,8 @@ struct KeyFile {
 }
 
 impl SecretKey {
-    /// Creates the key with these 32 secret bytes, which must come from the operating system's generator.
+    /// Creates the key with these 32 secret bytes, which must come from the operating system's
+    /// generator.
     pub fn from_bytes(secret: [u8; 32]) -> Self {
         SecretKey(secret)
     }
@@ -91,8 +93,8 @@ impl SecretKey {
         Message::from_bytes(&self.derive("recipient", recipient.as_bytes())[..RECIPIENT_BITS / 8])
     }
 
-    /// Returns as many key-dependent bits as `half` has, for one round of the whitening of messages of
-    /// `message_bits` bits.
+    /// Returns as many key-dependent bits as `half` has, for one round of the whitening of messages
+    /// of `message_bits` bits.
     pub(crate) fn round_bits(&self, message_bits: usize, round: u8, half: &[bool]) -> Vec<bool> {
         const BITS: usize = 256; // of one HMAC
         let half_bytes: Vec<u8> = half.iter().map(|bit| u8::from(*bit)).collect();
@@ -109,8 +111,8 @@ impl SecretKey {
         self.derive("chips", b"")
     }
 
-    /// Returns the HMAC-SHA-256 (FIPS 198-1) of a purpose and a text, so that one use of the key reveals
-    /// nothing about another.
+    /// Returns the HMAC-SHA-256 (FIPS 198-1) of a purpose and a text, so that one use of the key
+    /// reveals nothing about another.
     fn derive(&self, purpose: &str, text: &[u8]) -> [u8; 32] {
         let mut mac = Hmac::<Sha256>::new_from_slice(&self.0).expect("HMAC takes any key length");
         mac.update(b"meshmark v1 ");

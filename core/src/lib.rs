@@ -1,9 +1,9 @@
 //! Mesh-spectral watermarking of 2D vector maps: the algorithm, without files and without GDAL.
 //!
-//! The method is that of R. Ohbuchi, H. Ueda and S. Endoh, *Watermarking 2D Vector Maps in the Mesh-Spectral
-//! Domain*, Shape Modeling International 2003 ("the paper"). Each step has a module, in the order of the data
-//! flow: [`vertices`] → [`mesh`] → [`patches`] → [`spectrum`] → [`code`] → [`carrier`] → [`embedding`], and
-//! back through [`demodulation`].
+//! The method is that of R. Ohbuchi, H. Ueda and S. Endoh, *Watermarking 2D Vector Maps in the
+//! Mesh-Spectral Domain*, Shape Modeling International 2003 ("the paper"). Each step has a module,
+//! in the order of the data flow: [`vertices`] → [`mesh`] → [`patches`] → [`spectrum`] → [`code`] →
+//! [`carrier`] → [`embedding`], and back through [`demodulation`].
 //!
 //! ```
 //! use meshmark_core::{

@@ -11,11 +11,11 @@ use crate::{
 pub struct Map<'a> {
     /// The distinct vertices.
     pub vertices: &'a VertexTable,
-    /// The segments of rings and lines: canonical indices [a, b] with a < b, sorted, each pair once. Points
-    /// have none.
+    /// The segments of rings and lines: canonical indices [a, b] with a < b, sorted, each pair
+    /// once. Points have none.
     pub segments: &'a [[u32; 2]],
-    /// For every vertex the first vertex of its polygon group (polygons joined by shared vertices); the
-    /// vertex itself when it is in none.
+    /// For every vertex the first vertex of its polygon group (polygons joined by shared vertices);
+    /// the vertex itself when it is in none.
     pub polygon_roots: &'a [u32],
     /// Metres on the ground by the one scale of the mark.
     pub ground: Ground,

@@ -12,8 +12,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Triangulates `points` (distinct, relative to a local origin). Magnitudes under 2⁻¹⁴², which spade
-    /// refuses, count as zero.
+    /// Triangulates `points` (distinct, relative to a local origin). Magnitudes under 2⁻¹⁴², which
+    /// spade refuses, count as zero.
     ///
     /// # Errors
     /// [`Error::Collinear`] when no triangle exists.
@@ -50,15 +50,16 @@ impl Mesh {
         &self.edges
     }
 
-    /// Returns the corners of the triangles, counter-clockwise; the order of the triangles is unspecified.
+    /// Returns the corners of the triangles, counter-clockwise; the order of the triangles is
+    /// unspecified.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 }
 
-/// Maps the vertices of the triangulation to indices of points. These are the same unless two distinct
-/// vertices became one when the local origin was subtracted; then the mesh holds the first of them, and the
-/// bridging rule of [`crate::patches`] joins the other one to its patch.
+/// Maps the vertices of the triangulation to indices of points. These are the same unless two
+/// distinct vertices became one when the local origin was subtracted; then the mesh holds the first
+/// of them, and the bridging rule of [`crate::patches`] joins the other one to its patch.
 enum Numbering {
     Same,
     ByPosition(HashMap<[u64; 2], u32>),
@@ -88,8 +89,8 @@ fn bits(Point2 { x, y }: Point2<f64>) -> [u64; 2] {
     [(x + 0.0).to_bits(), (y + 0.0).to_bits()]
 }
 
-/// Returns whether no three points span a triangle, by an exact predicate. If all points lie on a line, the
-/// first and the last one in canonical order are its ends.
+/// Returns whether no three points span a triangle, by an exact predicate. If all points lie on a
+/// line, the first and the last one in canonical order are its ends.
 fn all_collinear(points: &[Point2<f64>]) -> bool {
     let place = |p: &Point2<f64>| [p.x, p.y];
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return true };

@@ -4,7 +4,8 @@ use crate::{Error, Result};
 
 /// Fewer bits without an error agree by chance more often than once in a million times.
 pub const LEAST_IDENTIFYING_BITS: usize = 24;
-/// So many leave room for several messages that are tried: the best p-value of 24 bits is near the default significance.
+/// So many leave room for several messages that are tried: the best p-value of 24 bits is near the
+/// default significance.
 pub const ADVISED_BITS: usize = 32;
 
 /// A message: m bits, a multiple of four, most significant bit of the first hex digit first.

@@ -11,9 +11,9 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Returns the displacement of every vertex in canonical order by a mark of full amplitude, metres: α p ∘ b′ on
-/// both axes of every patch. T-junctions and bodies follow as in [`crate::embedding`]; tolerance, grid and the
-/// neighbourhood of a vertex are not considered.
+/// Returns the displacement of every vertex in canonical order by a mark of full amplitude, metres:
+/// α p ∘ b′ on both axes of every patch. T-junctions and bodies follow as in [`crate::embedding`];
+/// tolerance, grid and the neighbourhood of a vertex are not considered.
 ///
 /// # Errors
 /// Those of [`Patches::carriers`], and a patch that cannot be solved.

@@ -1,8 +1,9 @@
-//! Continuous collision detection: it decides whether a vertex and a segment keep their relative places while
-//! both move in a straight line from the old coordinates to the new ones.
+//! Continuous collision detection: it decides whether a vertex and a segment keep their relative
+//! places while both move in a straight line from the old coordinates to the new ones.
 //!
-//! The topology of an arrangement of segments changes only where a vertex meets a segment. If no vertex does
-//! on the way, no new crossing appears, and every vertex stays on its side of every segment.
+//! The topology of an arrangement of segments changes only where a vertex meets a segment. If no
+//! vertex does on the way, no new crossing appears, and every vertex stays on its side of every
+//! segment.
 
 use crate::nearness::{cross, dot, metres, nearest};
 
@@ -10,7 +11,8 @@ use crate::nearness::{cross, dot, metres, nearest};
 const TOUCH_M: f64 = 1e-6;
 /// A gap stays at least this wide, or half as wide as it was.
 const LEAST_GAP_M: f64 = 1e-4;
-/// Rounding to 64-bit numbers adds at most this much, besides the last digits of the coordinates themselves.
+/// Rounding to 64-bit numbers adds at most this much, besides the last digits of the coordinates
+/// themselves.
 const ROUNDING_M: f64 = 1e-8;
 
 /// How far a vertex and a segment that touch may move against each other.
@@ -23,8 +25,8 @@ pub(crate) struct Slack {
 }
 
 impl Slack {
-    /// Derives the slack from the size `digit_m` of the last digit of a 64-bit coordinate. On a grid of
-    /// `grid_m` metres T-junctions hold within one step.
+    /// Derives the slack from the size `digit_m` of the last digit of a 64-bit coordinate. On a
+    /// grid of `grid_m` metres T-junctions hold within one step.
     pub fn new(digit_m: f64, grid_m: f64, junction_m: f64) -> Self {
         match grid_m {
             0.0 => Slack { touch_m: TOUCH_M, shift_m: ROUNDING_M + 4.0 * digit_m },
@@ -36,13 +38,14 @@ impl Slack {
 /// A vertex and the two ends of a segment, CRS units.
 pub(crate) type Triple = [[f64; 2]; 3];
 
-/// Returns whether vertex and segment keep their relative places from `before` to `after`; `scale` is metres
-/// per unit.
+/// Returns whether vertex and segment keep their relative places from `before` to `after`; `scale`
+/// is metres per unit.
 pub(crate) fn keeps_apart(before: &Triple, after: &Triple, scale: [f64; 2], slack: Slack) -> bool {
     let [vertex, a, b] = *before;
     let (p, e) = (metres(a, vertex, scale), metres(a, b, scale));
     let [dv, da, db] = [0, 1, 2].map(|i| metres(before[i], after[i], scale));
-    let (dp, de) = (minus(dv, da), minus(db, da)); // how the vertex and the end move, seen from the start
+    // The vertex and the end move by these, relative to the start.
+    let (dp, de) = (minus(dv, da), minus(db, da));
     let (gap2, share) = nearest(p, e);
     let gap = gap2.sqrt();
     if gap <= slack.touch_m {
@@ -57,9 +60,9 @@ pub(crate) fn keeps_apart(before: &Triple, after: &Triple, scale: [f64; 2], slac
     nearest(plus(p, dp), plus(e, de)).0 >= least_gap * least_gap && !meets(p, e, dp, de, least_gap)
 }
 
-/// Returns whether the point p + t dp meets the segment from 0 to e + t de for some t from 0 to 1: their
-/// cross product is a polynomial of degree two in t. A point that moves along the line of the segment counts
-/// as meeting it.
+/// Returns whether the point p + t dp meets the segment from 0 to e + t de for some t from 0 to 1:
+/// their cross product is a polynomial of degree two in t. A point that moves along the line of the
+/// segment counts as meeting it.
 fn meets(p: [f64; 2], e: [f64; 2], dp: [f64; 2], de: [f64; 2], pad_m: f64) -> bool {
     let (c, b, a) = (cross(e, p), cross(e, dp) + cross(de, p), cross(de, dp));
     let tiny = 1e-12 * (dot(p, p) + dot(e, e));

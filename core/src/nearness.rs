@@ -20,8 +20,8 @@ impl<'a> VertexTree<'a> {
         VertexTree { tree: RTree::bulk_load(vertices.map(leaf).collect()), map }
     }
 
-    /// Returns the vertices within `reach` (CRS units along x and y) of the bounding box of a segment,
-    /// without its ends.
+    /// Returns the vertices within `reach` (CRS units along x and y) of the bounding box of a
+    /// segment, without its ends.
     pub fn around(&self, [a, b]: [u32; 2], reach: [f64; 2]) -> impl Iterator<Item = u32> {
         let (p, q) = (self.map.at(a), self.map.at(b));
         let lower = [0, 1].map(|axis| p[axis].min(q[axis]) - reach[axis]);
@@ -31,8 +31,8 @@ impl<'a> VertexTree<'a> {
     }
 }
 
-/// Returns the squared distance from a point to a segment that starts at the origin, and where the nearest
-/// place is, as a share (0 to 1) of the way from its start to its end.
+/// Returns the squared distance from a point to a segment that starts at the origin, and where the
+/// nearest place is, as a share (0 to 1) of the way from its start to its end.
 pub(crate) fn nearest(point: [f64; 2], end: [f64; 2]) -> (f64, f64) {
     let length2 = dot(end, end);
     let share = if length2 > 0.0 { (dot(point, end) / length2).clamp(0.0, 1.0) } else { 0.0 };

@@ -1,11 +1,12 @@
-//! The shape of the noise and the transformation of residuals that suits it. Least squares is optimal under
-//! Gaussian noise only. Rounding to a grid and an attack that adds up to ±50 cm leave noise with short tails,
-//! under which large residuals carry more information about the mark than small ones.
+//! The shape of the noise and the transformation of residuals that suits it. Least squares is
+//! optimal under Gaussian noise only. Rounding to a grid and an attack that adds up to ±50 cm leave
+//! noise with short tails, under which large residuals carry more information about the mark than
+//! small ones.
 //!
-//! For noise of density f, the best test of a weak signal uses −f′/f of the residual in place of the residual
-//! (the locally optimum detector: Kassam, *Signal Detection in Non-Gaussian Noise*, 1988, chapter 2). Here f
-//! is a generalised Gaussian, exp(−|r|^κ), so −f′/f is sign(r) |r|^(κ−1); κ = 2 leaves residuals unchanged. κ
-//! is chosen from the residuals, without key or chips.
+//! For noise of density f, the best test of a weak signal uses −f′/f of the residual in place of
+//! the residual (the locally optimum detector: Kassam, *Signal Detection in Non-Gaussian Noise*,
+//! 1988, chapter 2). Here f is a generalised Gaussian, exp(−|r|^κ), so −f′/f is sign(r) |r|^(κ−1);
+//! κ = 2 leaves residuals unchanged. κ is chosen from the residuals, without key or chips.
 
 /// The exponents κ that are tried.
 const EXPONENTS: [f64; 6] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0];
@@ -26,8 +27,8 @@ pub struct NoiseLaw {
 }
 
 impl NoiseLaw {
-    /// Fits the law under which `residuals_m` (any number, metres, each of one axis) carry most information
-    /// about a shift.
+    /// Fits the law under which `residuals_m` (any number, metres, each of one axis) carry most
+    /// information about a shift.
     pub fn fit(residuals_m: &[f64]) -> Self {
         let plain = Self::with_exponent(2.0, residuals_m);
         if residuals_m.len() < LEAST_RESIDUALS {

@@ -1,5 +1,5 @@
-//! Patches: the pieces of nearly `patch_size` vertices into which the map is cut, each with its connected
-//! graph (paper, section 3.2; the split and the bridges are ours, see docs/method.md).
+//! Patches: the pieces of nearly `patch_size` vertices into which the map is cut, each with its
+//! connected graph (paper, section 3.2; the split and the bridges are ours, see docs/method.md).
 
 use crate::{
     Error, Result,
@@ -18,7 +18,8 @@ use rayon::prelude::*;
 pub struct Patch {
     /// Canonical indices of the patch's vertices, ascending; `n` of them.
     pub vertices: Vec<u32>,
-    /// Edges as pairs of positions in `vertices`, `[i, j]` with i < j, sorted; they join all vertices.
+    /// Edges as pairs of positions in `vertices`, `[i, j]` with i < j, sorted; they join all
+    /// vertices.
     pub edges: Vec<[u32; 2]>,
     /// The weight of each edge with [`Laplacian::Cotangent`]; empty with [`Laplacian::Biggs`].
     pub weights: Vec<f64>,
@@ -58,8 +59,8 @@ impl Patch {
         }
     }
 
-    /// Returns whether a vertex hangs on vertices of other patches, so that this patch does not determine its
-    /// movement.
+    /// Returns whether a vertex hangs on vertices of other patches, so that this patch does not
+    /// determine its movement.
     pub(crate) fn hangs_elsewhere(&self, row: usize) -> bool {
         let found = self.hanging.binary_search_by_key(&(row as u32), |hanging| hanging.row);
         found.is_ok_and(|i| self.hanging[i].anchors.is_empty())
@@ -71,7 +72,8 @@ impl Patch {
 pub struct Patches {
     patches: Vec<Patch>,
     positions_m: Vec<[f64; 2]>,
-    /// The polygon group of every vertex, as its first vertex; [`ALONE`] for a vertex without a group.
+    /// The polygon group of every vertex, as its first vertex; [`ALONE`] for a vertex without a
+    /// group.
     groups: Vec<u32>,
     constraints: Constraints,
 }
@@ -124,8 +126,8 @@ impl Patches {
         self.positions_m.len()
     }
 
-    /// Returns the positions of the vertices in canonical order, metres from the middle of the map, for
-    /// distances.
+    /// Returns the positions of the vertices in canonical order, metres from the middle of the map,
+    /// for distances.
     pub fn positions_m(&self) -> &[[f64; 2]] {
         &self.positions_m
     }
@@ -147,8 +149,8 @@ impl Patches {
         Patches { patches, positions_m, groups, constraints: Constraints::default() }
     }
 
-    /// Returns how many coefficients of a patch and axis carry a message of `bits` bits: one for every
-    /// channel bit and chip. They fit into the smallest patch besides the mean.
+    /// Returns how many coefficients of a patch and axis carry a message of `bits` bits: one for
+    /// every channel bit and chip. They fit into the smallest patch besides the mean.
     ///
     /// # Errors
     /// [`Error::TooManyCoefficients`] or [`Error::CodeLength`].
@@ -163,7 +165,8 @@ impl Patches {
         Ok(carriers)
     }
 
-    /// Checks the invariants: every vertex in one patch, ascending, edges sorted, patches connected.
+    /// Checks the invariants: every vertex in one patch, ascending, edges sorted, patches
+    /// connected.
     pub fn validate(&self) -> std::result::Result<(), String> {
         let mut seen = vec![false; self.positions_m.len()];
         for (number, patch) in self.patches.iter().enumerate() {
@@ -192,9 +195,9 @@ fn groups(map: &Map) -> Vec<u32> {
     (0..map.vertices.len()).map(|vertex| group(vertex).unwrap_or(ALONE)).collect()
 }
 
-/// Splits the vertices by a k-d tree into `parts` leaves of nearly equal size. Each set is cut across the
-/// longer side of its bounding box, in proportion to the leaves on either side. A body goes to the side of
-/// its first vertex.
+/// Splits the vertices by a k-d tree into `parts` leaves of nearly equal size. Each set is cut
+/// across the longer side of its bounding box, in proportion to the leaves on either side. A body
+/// goes to the side of its first vertex.
 fn split(points: &[[f64; 2]], constraints: &Constraints, parts: usize) -> Vec<Vec<u32>> {
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     let mut leaves = Vec::with_capacity(parts);
@@ -226,7 +229,8 @@ fn split_set(
         points[p as usize][axis].total_cmp(&points[q as usize][axis]).then(p.cmp(&q)).then(a.cmp(b))
     };
     set.select_nth_unstable_by(left, order);
-    // A body is a run in this order: the cut moves before or after the body it meets, whichever is nearer.
+    // A body is a run in this order: the cut moves before or after the body it meets, whichever is
+    // nearer.
     let cut = first(set[left]);
     let below = set[..left].iter().filter(|&&v| first(v) == cut).count();
     let above = set[left..].iter().filter(|&&v| first(v) == cut).count();
@@ -305,12 +309,13 @@ fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[Place])
     }
 }
 
-/// A triangle counts as no flatter than this (approximately height over base), so that cotangents stay
-/// finite.
+/// A triangle counts as no flatter than this (approximately height over base), so that cotangents
+/// stay finite.
 const LEAST_HEIGHT: f64 = 0.01;
 
-/// Weighs the edges of every patch by cot α + cot β, over the angles that face them in the triangles of the
-/// mesh with all three corners in the patch. Edges of no such triangle, bridges among them, weigh 1.
+/// Weighs the edges of every patch by cot α + cot β, over the angles that face them in the
+/// triangles of the mesh with all three corners in the patch. Edges of no such triangle, bridges
+/// among them, weigh 1.
 fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points: &[[f64; 2]]) {
     let mut of_patch: Vec<Vec<[u32; 3]>> = vec![Vec::new(); patches.len()];
     for triangle in triangles {
@@ -334,8 +339,8 @@ fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points
     });
 }
 
-/// Returns the cotangent of a triangle's angle at a corner. The three cotangents of a flat triangle shrink
-/// alike, so that its energy stays positive.
+/// Returns the cotangent of a triangle's angle at a corner. The three cotangents of a flat triangle
+/// shrink alike, so that its energy stays positive.
 fn cotangent(at: [[f64; 2]; 3], corner: usize) -> f64 {
     let side = |from: usize, to: usize| [at[to][0] - at[from][0], at[to][1] - at[from][1]];
     let (u, v) = (side(corner, (corner + 1) % 3), side(corner, (corner + 2) % 3));
@@ -343,7 +348,8 @@ fn cotangent(at: [[f64; 2]; 3], corner: usize) -> f64 {
     dot(u, v) / cross(u, v).abs().max(LEAST_HEIGHT * longest2)
 }
 
-/// Returns the component of every vertex of a patch, by its first vertex, and how many components there are.
+/// Returns the component of every vertex of a patch, by its first vertex, and how many components
+/// there are.
 fn components(patch: &Patch) -> (Vec<u32>, usize) {
     let mut pieces = DisjointSets::new(patch.vertices.len());
     patch.edges.iter().for_each(|&[a, b]| pieces.join(a, b));
@@ -352,9 +358,10 @@ fn components(patch: &Patch) -> (Vec<u32>, usize) {
     (label, count)
 }
 
-/// Joins the pieces of a patch: cutting the edges between patches can disconnect a patch, and a disconnected
-/// graph has a repeated eigenvalue 0. Starting from the piece of the first vertex, the piece with the
-/// shortest edge to the joined ones is added (ties: smaller positions) until one piece is left.
+/// Joins the pieces of a patch: cutting the edges between patches can disconnect a patch, and a
+/// disconnected graph has a repeated eigenvalue 0. Starting from the piece of the first vertex, the
+/// piece with the shortest edge to the joined ones is added (ties: smaller positions) until one
+/// piece is left.
 fn bridge(patch: &mut Patch, points: &[[f64; 2]]) {
     let (label, count) = components(patch);
     if count == 1 {
@@ -366,7 +373,8 @@ fn bridge(patch: &mut Patch, points: &[[f64; 2]]) {
         (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
     };
     let n = patch.vertices.len();
-    let mut nearest = vec![(f64::INFINITY, 0); n]; // distance² to, and position of, the nearest joined vertex
+    // Each entry holds distance² to, and position of, the nearest joined vertex.
+    let mut nearest = vec![(f64::INFINITY, 0); n];
     let mut joined = vec![false; n];
     let mut piece = label[0];
     loop {

@@ -1,5 +1,5 @@
-//! The final place of a vertex: within the tolerance, on the output grid, and away from the edges of the
-//! world.
+//! The final place of a vertex: within the tolerance, on the output grid, and away from the edges
+//! of the world.
 
 use crate::{Error, Result, map::Map, options::Parameters, scale::Measure};
 
@@ -38,7 +38,8 @@ impl<'a> Placement<'a> {
             }
             share *= 1.0 - 1e-9; // the sum above was rounded past the tolerance
             if share < 0.5 {
-                return from; // a coordinate so large that its last digit is worth more than the tolerance
+                // The last digit of so large a coordinate is worth more than the tolerance.
+                return from;
             }
         }
     }
@@ -53,7 +54,8 @@ impl<'a> Placement<'a> {
         self.measure.ground.is_pinned(from, self.tolerance_m)
     }
 
-    /// Returns the furthest that a vertex near `at` may move, metres of a `scale` in metres per unit.
+    /// Returns the furthest that a vertex near `at` may move, metres of a `scale` in metres per
+    /// unit.
     pub fn tolerance_in(&self, at: [f64; 2], scale: [f64; 2]) -> f64 {
         let there = self.measure.metres_per_unit(at);
         self.tolerance_m * (scale[0] / there[0]).min(scale[1] / there[1])
@@ -69,8 +71,9 @@ fn distance_m(a: [f64; 2], b: [f64; 2], scale: [f64; 2]) -> f64 {
     ((b[0] - a[0]) * scale[0]).hypot((b[1] - a[1]) * scale[1])
 }
 
-/// Returns the grid node nearest to `target` among those within the tolerance of `from`. As `target` is
-/// within the tolerance, which is at least a cell, such a node exists less than √2 cells away.
+/// Returns the grid node nearest to `target` among those within the tolerance of `from`. As
+/// `target` is within the tolerance, which is at least a cell, such a node exists less than √2
+/// cells away.
 fn nearest_node(
     target: [f64; 2],
     from: [f64; 2],

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// The version this program writes and reads.
 pub const VERSION: u32 = 1;
 
-/// A record. Its fields are the option names in lower case, with their unit. It holds neither the secret nor
-/// the time, so that equal input makes an equal record.
+/// A record. Its fields are the option names in lower case, with their unit. It holds neither the
+/// secret nor the time, so that equal input makes an equal record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -26,7 +26,8 @@ pub struct Record {
     pub recipient: Option<String>,
     /// The message, hexadecimal.
     pub message: String,
-    /// Whether the key whitened the message before it was coded; omitted when it did not, as for recipients.
+    /// Whether the key whitened the message before it was coded; omitted when it did not, as for
+    /// recipients.
     #[serde(default, skip_serializing_if = "is_false")]
     pub whitened: bool,
     /// The numbers that shaped the mark, fields of their own in the JSON.
@@ -136,7 +137,8 @@ impl Record {
     /// Returns the options that made the mark.
     ///
     /// # Errors
-    /// Those of [`Record::subject`], and [`Error::Record`] when a value is out of range.
+    /// Returns the errors of [`Record::subject`], and [`Error::Record`] when a value is out of
+    /// range.
     pub fn options(&self) -> Result<Options> {
         let options = Options {
             key_path: None,
@@ -161,7 +163,8 @@ impl Record {
     /// Returns the subject of the mark.
     ///
     /// # Errors
-    /// Those of [`Record::message`], and [`Error::Record`] for a recipient with a whitened message.
+    /// Returns the errors of [`Record::message`], and [`Error::Record`] for a recipient with a
+    /// whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
             Some(_) if self.whitened => Err(Error::Record(

@@ -18,7 +18,8 @@ pub(crate) enum Response {
 pub(crate) struct Kernel {
     /// Products of columns of one axis, for the named axes: lower triangles, k × k.
     pub own: Vec<(Vec<usize>, Mat<f64>)>,
-    /// Products of columns of the first axis (rows) with those of the second (columns), where they are not 0.
+    /// Products of columns of the first axis (rows) with those of the second (columns), where they
+    /// are not 0.
     pub cross: Option<Mat<f64>>,
 }
 
@@ -33,8 +34,9 @@ impl Kernel {
 }
 
 impl Response {
-    /// Returns the response to the coefficients that carry the mark, all but the mean. With SHAPE=rigid it is
-    /// amplified, so that the expected displacement, root mean square, is that of free vertices.
+    /// Returns the response to the coefficients that carry the mark, all but the mean. With
+    /// SHAPE=rigid it is amplified, so that the expected displacement, root mean square, is that of
+    /// free vertices.
     pub fn carriers(patch: &Patch, basis: &Basis, shape: Rigidity) -> Self {
         let carriers = basis.vectors.ncols() - 1;
         let basis = basis.vectors.subcols(1, carriers);
@@ -46,8 +48,8 @@ impl Response {
         response
     }
 
-    /// Returns the ratio of the root mean square displacements by the basis functions with T-junctions alone
-    /// and with bodies.
+    /// Returns the ratio of the root mean square displacements by the basis functions with
+    /// T-junctions alone and with bodies.
     pub fn gain(&self, patch: &Patch, mut basis: Mat<f64>) -> f64 {
         let Response::Coupled(blocks) = self else { return 1.0 };
         patch.follow(&mut basis);
@@ -55,8 +57,8 @@ impl Response {
         if energy > 0.0 { (2.0 * basis.squared_norm_l2() / energy).sqrt() } else { 1.0 }
     }
 
-    /// Returns the response to basis functions (columns, n × k): free vertices follow them, bodies follow by
-    /// the nearest rigid motion, and hanging vertices follow their anchors.
+    /// Returns the response to basis functions (columns, n × k): free vertices follow them, bodies
+    /// follow by the nearest rigid motion, and hanging vertices follow their anchors.
     pub fn new(patch: &Patch, basis: Mat<f64>) -> Self {
         let mut response = match patch.bodies.is_empty() {
             true => Response::Separate(basis),
@@ -73,8 +75,8 @@ impl Response {
         }
     }
 
-    /// Returns the covariance over vertices of the displacement along one axis for random coefficients of ±1,
-    /// or the mean of both axes where they differ.
+    /// Returns the covariance over vertices of the displacement along one axis for random
+    /// coefficients of ±1, or the mean of both axes where they differ.
     pub fn covariance(&self) -> Mat<f64> {
         let of = |block: &Mat<f64>| block * block.transpose();
         match self {
@@ -156,8 +158,8 @@ fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
     gram
 }
 
-/// Returns the coupled response: bodies shift by the mean of their vertices and turn by θ = Σ (r_x u_y − r_y
-/// u_x) / Σ |r|²: the rigid motion nearest to the displacements u.
+/// Returns the coupled response: bodies shift by the mean of their vertices and turn by
+/// θ = Σ (r_x u_y − r_y u_x) / Σ |r|²: the rigid motion nearest to the displacements u.
 fn coupled(patch: &Patch, basis: Mat<f64>) -> [[Mat<f64>; 2]; 2] {
     let (n, columns) = (basis.nrows(), basis.ncols());
     let mut blocks = [[basis.clone(), Mat::zeros(n, columns)], [Mat::zeros(n, columns), basis]];

@@ -1,7 +1,9 @@
-//! The scale at each vertex: metres on the ground per CRS unit, which vary over the map of a projected CRS.
+//! The scale at each vertex: metres on the ground per CRS unit, which vary over the map of a
+//! projected CRS.
 //!
-//! The mark itself has one scale for the whole map, [`Ground::Plane`]; version 1 of the mark fixes it.
-//! TOLERANCE and the figures of records and comparisons are measured by the scale of this module.
+//! The mark itself has one scale for the whole map, [`Ground::Plane`]; version 1 of the mark fixes
+//! it. TOLERANCE and the figures of records and comparisons are measured by the scale of this
+//! module.
 
 use crate::{ground::Ground, vertices::VertexTable};
 
@@ -18,8 +20,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Creates the scale from the vectors on the ground of a unit along x and of a unit along y, metres, in
-    /// any three perpendicular axes.
+    /// Creates the scale from the vectors on the ground of a unit along x and of a unit along y,
+    /// metres, in any three perpendicular axes.
     pub fn new(along_x: [f64; 3], along_y: [f64; 3]) -> Self {
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (xx, xy, yy) = (dot(along_x, along_x), dot(along_x, along_y), dot(along_y, along_y));
@@ -55,8 +57,9 @@ pub struct ScaleLattice {
 }
 
 impl ScaleLattice {
-    /// Measures a lattice; `scales_at` returns the scales at many places. A map in which the error of the one
-    /// scale `metres_per_unit` is less than `negligible` (a share) everywhere needs none.
+    /// Measures a lattice; `scales_at` returns the scales at many places. A map in which the error
+    /// of the one scale `metres_per_unit` is less than `negligible` (a share) everywhere needs
+    /// none.
     pub fn measure(
         vertices: &VertexTable,
         metres_per_unit: f64,
@@ -83,8 +86,8 @@ impl ScaleLattice {
         ScaleLattice { lower, cell, nodes_per_side, nodes: scales_at(&places) }
     }
 
-    /// Interpolates the scale at a point from the corners of its cell that have one; `None` where none of
-    /// them has.
+    /// Interpolates the scale at a point from the corners of its cell that have one; `None` where
+    /// none of them has.
     pub fn at(&self, point: [f64; 2]) -> Option<Scale> {
         let last = self.nodes_per_side - 2;
         let place = |axis: usize| {
@@ -133,8 +136,9 @@ impl Measure<'_> {
         [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
     }
 
-    /// The largest share by which the one scale of the mark is wrong at a vertex, where it is more than version 1 of the
-    /// mark allows, and the two vertices where a unit is the shortest and the longest.
+    /// The largest share by which the one scale of the mark is wrong at a vertex, where it is more
+    /// than version 1 of the mark allows, and the two vertices where a unit is the shortest and the
+    /// longest.
     pub fn unevenness(&self, vertices: &VertexTable) -> Option<(f64, [[f64; 2]; 2])> {
         let (Some(lattice), Ground::Plane { metres_per_unit }) = (self.lattice, self.ground) else {
             return None;

@@ -1,12 +1,13 @@
 //! Vertices that touch a segment stay on their side of it, to the last bit.
 //!
-//! Such a vertex follows the place where it touches, and rounding puts it on either side. Where all its own
-//! segments lead away on one side, the other side is through the wall: the vertex is nudged back by a few
-//! ulps.
+//! Such a vertex follows the place where it touches, and rounding puts it on either side. Where all
+//! its own segments lead away on one side, the other side is through the wall: the vertex is nudged
+//! back by a few ulps.
 
 use crate::{map::Map, orientation::orientation, placement::Placement};
 
-/// Contacts depend on each other through shared vertices; this many rounds exceed the longest chain.
+/// Contacts depend on each other through shared vertices; this many rounds exceed the longest
+/// chain.
 const MOST_ROUNDS: usize = 16;
 /// A vertex is nudged by at most this many ulps.
 const MOST_STEPS: usize = 64;
@@ -30,7 +31,8 @@ impl Contact {
     }
 }
 
-/// Puts vertices back on their side; `coords` are their new places. On a grid there is no room for it.
+/// Puts vertices back on their side; `coords` are their new places. On a grid there is no room for
+/// it.
 pub(crate) fn keep(map: &Map, touching: &[Touching], placement: &Placement, coords: &mut [[f64; 2]]) {
     if placement.grid() > 0.0 || touching.is_empty() {
         return;

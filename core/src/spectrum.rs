@@ -12,23 +12,23 @@ use rand_chacha::{
 };
 use std::borrow::Cow;
 
-/// Eigenvalues closer than this share one subspace, whose basis [`canonical_rotation`] chooses, not the
-/// solver.
+/// Eigenvalues closer than this share one subspace, whose basis [`canonical_rotation`] chooses, not
+/// the solver.
 const EQUAL_EIGENVALUES: f64 = 1e-8;
 
 /// The first eigenvectors of the Laplacian of a patch.
 ///
-/// The Biggs Laplacian R = I − D⁻¹A is not symmetric. With L = I − D^−½ A D^−½ = U Λ Uᵀ, its eigenvectors are w_i = D^−½ u_i and
-/// the basis is e_i = w_i / |w_i|. E is not orthogonal; analysis uses its dual, whose row i is
-/// |w_i| u_iᵀ D^½ = |w_i|² e_iᵀ D.
+/// The Biggs Laplacian R = I − D⁻¹A is not symmetric. With L = I − D^−½ A D^−½ = U Λ Uᵀ, its
+/// eigenvectors are w_i = D^−½ u_i and the basis is e_i = w_i / |w_i|. E is not orthogonal;
+/// analysis uses its dual, whose row i is |w_i| u_iᵀ D^½ = |w_i|² e_iᵀ D.
 ///
 /// The cotangent Laplacian is symmetric: the same holds with D = I.
 #[derive(Debug, Clone)]
 pub struct Basis {
     /// n × k, column i = e_i, |e_i| = 1; column 0 is the constant one (eigenvalue 0).
     pub vectors: Mat<f64>,
-    /// k eigenvalues, ascending; those of Biggs are in [0, 2], cotangent ones are shares of the largest
-    /// diagonal entry.
+    /// k eigenvalues, ascending; those of Biggs are in [0, 2], cotangent ones are shares of the
+    /// largest diagonal entry.
     pub eigenvalues: Vec<f64>,
     /// n vertex degrees, the diagonal of D; 1 each with the cotangent Laplacian.
     pub degrees: Vec<f64>,
@@ -45,9 +45,10 @@ impl Basis {
         Self::with_solver(patch, count, solve)
     }
 
-    /// Solves with another symmetric eigen-solver, which takes L (n × n) and `count` and returns the `count`
-    /// lowest eigenvalues, ascending, and their eigenvectors as columns, with all that are equal to the last
-    /// of them; further ones are ignored. With it tests prove that the basis does not depend on the solver.
+    /// Solves with another symmetric eigen-solver, which takes L (n × n) and `count` and returns
+    /// the `count` lowest eigenvalues, ascending, and their eigenvectors as columns, with all that
+    /// are equal to the last of them; further ones are ignored. With it tests prove that the basis
+    /// does not depend on the solver.
     #[doc(hidden)]
     pub fn with_solver(
         patch: &Patch,
@@ -66,7 +67,8 @@ impl Basis {
         Ok(Basis { vectors, eigenvalues: values[..count].to_vec(), degrees, norms_squared })
     }
 
-    /// Returns the basis of patch `number` from the `known` ones of the first patches, or solves for it.
+    /// Returns the basis of patch `number` from the `known` ones of the first patches, or solves
+    /// for it.
     pub(crate) fn known_or_solved<'a>(
         known: &'a [Basis],
         number: usize,
@@ -112,9 +114,10 @@ fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
     (laplacian, degrees)
 }
 
-/// Returns the Dirichlet Laplacian of a patch (n × n), −(cot α + cot β) off the diagonal and rows that sum to 0
-/// (U. Pinkall, K. Polthier, *Computing discrete minimal surfaces and their conjugates*, Exp. Math. 2, 1993),
-/// divided by its largest diagonal entry: which eigenvalues are equal must not depend on the unit of the map.
+/// Returns the Dirichlet Laplacian of a patch (n × n), −(cot α + cot β) off the diagonal and rows
+/// that sum to 0 (U. Pinkall, K. Polthier, *Computing discrete minimal surfaces and their
+/// conjugates*, Exp. Math. 2, 1993), divided by its largest diagonal entry: which eigenvalues are
+/// equal must not depend on the unit of the map.
 fn cotangent_laplacian(patch: &Patch) -> Mat<f64> {
     let n = patch.vertices.len();
     let mut laplacian = Mat::zeros(n, n);
@@ -129,9 +132,10 @@ fn cotangent_laplacian(patch: &Patch) -> Mat<f64> {
     laplacian / faer::Scale(largest)
 }
 
-/// Solves for the lowest eigenvalues and eigenvectors of a symmetric matrix, as [`Basis::with_solver`] needs
-/// them: it tridiagonalises, solves the tridiagonal problem, and transforms only the resulting columns back.
-/// It uses one thread, so that the result does not depend on the number of threads.
+/// Solves for the lowest eigenvalues and eigenvectors of a symmetric matrix, as
+/// [`Basis::with_solver`] needs them: it tridiagonalises, solves the tridiagonal problem, and
+/// transforms only the resulting columns back. It uses one thread, so that the result does not
+/// depend on the number of threads.
 fn solve(mut matrix: Mat<f64>, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = matrix.nrows();
     let block = qr::no_pivoting::factor::recommended_block_size::<f64>(n, n);
@@ -184,9 +188,9 @@ fn canonicalise(values: &[f64], vectors: &mut Mat<f64>) {
     }
 }
 
-/// Returns the rotation Q (g × g) that takes the eigenvectors U (n × g) of one eigenvalue to a basis that
-/// depends on their subspace alone: with probes F (n × g), UᵀF = QR, diag R > 0. Any other orthonormal basis
-/// UO gives OᵀQ and so the same UQ. For g = 1 it is the sign of uᵀf.
+/// Returns the rotation Q (g × g) that takes the eigenvectors U (n × g) of one eigenvalue to a
+/// basis that depends on their subspace alone: with probes F (n × g), UᵀF = QR, diag R > 0. Any
+/// other orthonormal basis UO gives OᵀQ and so the same UQ. For g = 1 it is the sign of uᵀf.
 fn canonical_rotation(group: MatRef<'_, f64>, probes: MatRef<'_, f64>) -> Mat<f64> {
     let size = group.ncols();
     let seen = group.transpose() * probes;
@@ -200,8 +204,9 @@ fn canonical_rotation(group: MatRef<'_, f64>, probes: MatRef<'_, f64>) -> Mat<f6
     rotation
 }
 
-/// Fixed pseudo-random test functions on the vertices of a patch. They come from ChaCha20 with a published
-/// seed: anyone can reproduce them, and no symmetric map is orthogonal to them by its symmetry.
+/// Fixed pseudo-random test functions on the vertices of a patch. They come from ChaCha20 with a
+/// published seed: anyone can reproduce them, and no symmetric map is orthogonal to them by its
+/// symmetry.
 ///
 /// Column i is made when a group first needs it; entry (v, i) is uniform in [−1, 1).
 struct Probes {

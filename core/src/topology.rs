@@ -1,8 +1,8 @@
 //! Moving vertices without changing the topology of the map: no vertex passes through a segment.
 //!
-//! Where the mark would push a vertex through, the vertices involved form a cluster. It is attenuated step by
-//! step: first the differences among its displacements, then their mean. A map that does not move is always
-//! legal, so the procedure ends.
+//! Where the mark would push a vertex through, the vertices involved form a cluster. It is
+//! attenuated step by step: first the differences among its displacements, then their mean. A map
+//! that does not move is always legal, so the procedure ends.
 
 use crate::{
     bodies::{Body, Motion},
@@ -18,8 +18,9 @@ use crate::{
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The movement of a cluster at each level of attenuation: the share of its mean displacement, and the share
-/// of the deviations of its members from that mean. Level 0 is a vertex that no other restrains.
+/// The movement of a cluster at each level of attenuation: the share of its mean displacement, and
+/// the share of the deviations of its members from that mean. Level 0 is a vertex that no other
+/// restrains.
 const LEVELS: [(f64, f64); 6] = [(1.0, 1.0), (1.0, 0.5), (1.0, 0.25), (1.0, 0.0), (0.5, 0.0), (0.0, 0.0)];
 /// The last level: all members stay in place.
 const FROZEN: usize = LEVELS.len() - 1;
@@ -32,13 +33,15 @@ pub(crate) struct Settled {
     pub coords: Vec<[f64; 2]>,
     /// How many vertices moved differently from what was wanted.
     pub attenuated: usize,
-    /// The deviation from what was wanted, metres along an axis: root mean square over all vertices.
+    /// The deviation from what was wanted, metres along an axis: root mean square over all
+    /// vertices.
     pub deviation_m: f64,
 }
 
-/// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest to it, as
-/// far as the topology of the map and the placement allow; `tree` holds all vertices. On a grid too coarse
-/// for the map, rounding alone may change the topology; such changes are not undone.
+/// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest
+/// to it, as far as the topology of the map and the placement allow; `tree` holds all vertices. On
+/// a grid too coarse for the map, rounding alone may change the topology; such changes are not
+/// undone.
 pub(crate) fn settle(
     map: &Map,
     tree: &VertexTree,
@@ -74,7 +77,8 @@ pub(crate) fn settle(
 /// A vertex and a segment that meet.
 type Hit = [u32; 3];
 
-/// The state of the movement. Its movers are free vertices, and bodies, each named by its first vertex.
+/// The state of the movement. Its movers are free vertices, and bodies, each named by its first
+/// vertex.
 struct Movement<'a> {
     map: Map<'a>,
     constraints: &'a Constraints,
@@ -184,8 +188,8 @@ impl<'a> Movement<'a> {
         Changed { tree: VertexTree::new(self.map, changed), is_changed }
     }
 
-    /// Returns all vertices that meet a segment on their way, or, after a change, those that the change
-    /// affects.
+    /// Returns all vertices that meet a segment on their way, or, after a change, those that the
+    /// change affects.
     fn hits(&self, tree: &VertexTree, changed: Option<&Changed>) -> Vec<Hit> {
         let moved =
             |v: usize| [0, 1].map(|axis| (self.coords[v][axis] - self.map.vertices.coords()[v][axis]).abs());
@@ -230,7 +234,8 @@ fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 /// Movers that move together, as disjoint sets.
 struct Clusters {
     sets: DisjointSets,
-    /// By their roots. One body alone is a cluster, too: its turn may carry it through what hangs on it.
+    /// By their roots. One body alone is a cluster, too: its turn may carry it through what hangs
+    /// on it.
     clusters: BTreeMap<u32, Cluster>,
 }
 
@@ -245,8 +250,8 @@ impl Clusters {
         Clusters { sets: DisjointSets::new(vertices), clusters: BTreeMap::new() }
     }
 
-    /// Joins the vertices of every hit, raises the level of their clusters and returns the roots of these.
-    /// Clusters that are frozen cannot be attenuated further and are not among them.
+    /// Joins the vertices of every hit, raises the level of their clusters and returns the roots of
+    /// these. Clusters that are frozen cannot be attenuated further and are not among them.
     fn merge(&mut self, hits: impl Iterator<Item = Vec<u32>>) -> BTreeSet<u32> {
         let (mut joined, mut again) = (BTreeSet::new(), Vec::new());
         for movers in hits {

@@ -1,14 +1,16 @@
 //! The lowest eigenvalues and eigenvectors of a symmetric tridiagonal matrix.
 //!
-//! Divide and conquer computes all n vectors at O(n³) together. When the wanted eigenvalues lie apart, as
-//! those of a real map do, a single vector costs O(n): Sturm counts enclose its eigenvalue (J. H. Wilkinson,
-//! *The Algebraic Eigenvalue Problem*, 1965, chapter 5), and a twisted factorisation gives the vector and a
-//! better eigenvalue (B. N. Parlett, I. S. Dhillon, *Fernando's solution to Wilkinson's problem*, Linear
-//! Algebra and its Applications 267, 1997). Both treat a batch of eigenvalues at a time.
+//! Divide and conquer computes all n vectors at O(n³) together. When the wanted eigenvalues lie
+//! apart, as those of a real map do, a single vector costs O(n): Sturm counts enclose its
+//! eigenvalue (J. H. Wilkinson, *The Algebraic Eigenvalue Problem*, 1965, chapter 5), and a twisted
+//! factorisation gives the vector and a better eigenvalue (B. N. Parlett, I. S. Dhillon,
+//! *Fernando's solution to Wilkinson's problem*, Linear Algebra and its Applications 267, 1997).
+//! Both treat a batch of eigenvalues at a time.
 //!
-//! The result is verified: an eigenvalue lies within the residual of each value, the enclosures are disjoint,
-//! and the error of a vector is at most its residual over the distance to the next eigenvalue. Divide and
-//! conquer solves a matrix that fails, for example one with repeated eigenvalues.
+//! The result is verified: an eigenvalue lies within the residual of each value, the enclosures are
+//! disjoint, and the error of a vector is at most its residual over the distance to the next
+//! eigenvalue. Divide and conquer solves a matrix that fails, for example one with repeated
+//! eigenvalues.
 #![expect(clippy::needless_range_loop)] // one lane of several arrays at a time
 
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -57,8 +59,9 @@ impl Tridiagonal {
         Tridiagonal { diagonal, below }
     }
 
-    /// Returns at least the `count` lowest eigenvalues, ascending, and their eigenvectors, columns of n:
-    /// `count` of them when all are more than `least_gap` from any other eigenvalue, else all n.
+    /// Returns at least the `count` lowest eigenvalues, ascending, and their eigenvectors, columns
+    /// of n: `count` of them when all are more than `least_gap` from any other eigenvalue, else all
+    /// n.
     ///
     /// It is `None` when divide and conquer does not converge.
     pub fn lowest(&self, count: usize, least_gap: f64) -> Option<(Vec<f64>, Mat<f64>)> {
@@ -100,8 +103,9 @@ impl Tridiagonal {
     }
 }
 
-/// [`Tridiagonal::lowest`] for eigenvalues that lie apart. Everything it calls is inlined, so that it is
-/// compiled for every instruction set; the results are the same on all, as no operations are fused.
+/// [`Tridiagonal::lowest`] for eigenvalues that lie apart. Everything it calls is inlined, so that
+/// it is compiled for every instruction set; the results are the same on all, as no operations are
+/// fused.
 struct Apart<'a> {
     matrix: &'a Tridiagonal,
     count: usize,
@@ -180,8 +184,8 @@ impl Tridiagonal {
         enclosures
     }
 
-    /// Counts the eigenvalues below each shift λ, which are the changes of sign in the sequence of the
-    /// leading principal minors of T − λ.
+    /// Counts the eigenvalues below each shift λ, which are the changes of sign in the sequence of
+    /// the leading principal minors of T − λ.
     #[inline(always)]
     fn sturm_counts(&self, shifts: &Lanes) -> [u64; LANES] {
         let mut counts = [0; LANES];
@@ -238,7 +242,8 @@ impl Batch {
             let squares = self.solve(&twists);
             self.scales = from_fn(|lane| 1.0 / squares[lane].sqrt());
             residuals = from_fn(|lane| gammas[lane].abs() * self.scales[lane]);
-            self.shifts = from_fn(|lane| self.shifts[lane] + gammas[lane] / squares[lane]); // Rayleigh quotient
+            // This is the Rayleigh quotient.
+            self.shifts = from_fn(|lane| self.shifts[lane] + gammas[lane] / squares[lane]);
             if residuals.iter().all(|residual| *residual < small) {
                 break;
             }
@@ -246,8 +251,8 @@ impl Batch {
         residuals
     }
 
-    /// Factorises T − λ from above and from below, and returns the row k where the two meet with the
-    /// smallest |γ_k|, and that γ_k.
+    /// Factorises T − λ from above and from below, and returns the row k where the two meet with
+    /// the smallest |γ_k|, and that γ_k.
     #[inline(always)]
     fn factorise(&mut self, Tridiagonal { diagonal, below }: &Tridiagonal) -> (Lanes, Lanes) {
         let n = diagonal.len();
@@ -315,7 +320,8 @@ fn away_from_zero(pivot: f64) -> f64 {
     if pivot.abs() < LEAST_PIVOT { LEAST_PIVOT } else { pivot }
 }
 
-/// Orthogonalises the vectors of eigenvalues closer than `close` by the process of Gram and Schmidt.
+/// Orthogonalises the vectors of eigenvalues closer than `close` by the process of Gram and
+/// Schmidt.
 #[inline(always)]
 fn orthogonalise(values: &[f64], vectors: &mut Mat<f64>, close: f64) {
     for i in 1..values.len() {
@@ -396,7 +402,8 @@ mod tests {
 
     #[test]
     fn equal_eigenvalues_are_left_to_divide_and_conquer() {
-        // Wilkinson's matrix: no entry is small, and yet the pairs of large eigenvalues agree to the last digit.
+        // Wilkinson's matrix: no entry is small, and yet the pairs of large eigenvalues agree to
+        // the last digit.
         let wilkinson =
             Tridiagonal::new((0..41).map(|i| -f64::abs(i as f64 - 20.0)).collect(), vec![1.0; 40]);
         // Two strings that do not touch.

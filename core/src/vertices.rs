@@ -23,10 +23,11 @@ impl VertexTable {
         Ok(Self::indexed(coords)?.0)
     }
 
-    /// Does the same as [`Self::new`], and returns the canonical index of the vertex of each of `coords`.
+    /// Does the same as [`Self::new`], and returns the canonical index of the vertex of each of
+    /// `coords`.
     ///
     /// # Errors
-    /// Those of [`Self::new`].
+    /// Returns the errors of [`Self::new`].
     pub fn indexed(coords: Vec<[f64; 2]>) -> Result<(Self, Vec<u32>)> {
         if let Some(index) = coords.iter().position(|p| !p[0].is_finite() || !p[1].is_finite()) {
             let [x, y] = coords[index];
@@ -86,15 +87,16 @@ impl VertexTable {
         [min[0] + (max[0] - min[0]) / 2.0, min[1] + (max[1] - min[1]) / 2.0]
     }
 
-    /// Returns coordinates relative to the middle of the map, x multiplied by `x_scale`; mesh and patches are
-    /// built on them. Without the shift, triangulating EPSG:3857 coordinates loses vertices.
+    /// Returns coordinates relative to the middle of the map, x multiplied by `x_scale`; mesh and
+    /// patches are built on them. Without the shift, triangulating EPSG:3857 coordinates loses
+    /// vertices.
     pub fn local(&self, x_scale: f64) -> Vec<[f64; 2]> {
         let [x0, y0] = self.centre();
         self.coords.iter().map(|[x, y]| [(x - x0) * x_scale, y - y0]).collect()
     }
 
-    /// Returns the SHA-256 of the canonical vertices (x then y, 64-bit IEEE, little endian) in hexadecimal,
-    /// which binds a record to its reference map.
+    /// Returns the SHA-256 of the canonical vertices (x then y, 64-bit IEEE, little endian) in
+    /// hexadecimal, which binds a record to its reference map.
     pub fn digest(&self) -> String {
         let mut hash = Sha256::new();
         for [x, y] in &self.coords {

@@ -1,11 +1,12 @@
-//! Whitening: messages that differ in one bit are carried as bits that differ in half of their places.
+//! Whitening: messages that differ in one bit are carried as bits that differ in half of their
+//! places.
 //!
-//! A message that a producer chooses may be a serial number, and the numbers of two copies then differ in
-//! very few bits. A keyed pseudorandom permutation of all messages of one length makes the carried bits of
-//! every message those of a random one, as the null hypothesis of the verdict assumes. The permutation is a
-//! balanced Feistel network (M. Luby, C. Rackoff, *How to construct pseudorandom permutations from
-//! pseudorandom functions*, SIAM Journal on Computing 17, 1988) of ten rounds, as many as NIST SP 800-38G
-//! has, over HMAC-SHA-256.
+//! A message that a producer chooses may be a serial number, and the numbers of two copies then
+//! differ in very few bits. A keyed pseudorandom permutation of all messages of one length makes
+//! the carried bits of every message those of a random one, as the null hypothesis of the verdict
+//! assumes. The permutation is a balanced Feistel network (M. Luby, C. Rackoff, *How to construct
+//! pseudorandom permutations from pseudorandom functions*, SIAM Journal on Computing 17, 1988) of
+//! ten rounds, as many as NIST SP 800-38G has, over HMAC-SHA-256.
 
 use crate::{key::SecretKey, message::Message};
 
@@ -23,8 +24,8 @@ impl SecretKey {
     }
 }
 
-/// Adds, in every round, a keyed function of one half to the other half: even rounds change the first half,
-/// odd rounds the second, so that a round is its own inverse.
+/// Adds, in every round, a keyed function of one half to the other half: even rounds change the
+/// first half, odd rounds the second, so that a round is its own inverse.
 fn permute(key: &SecretKey, message: &Message, rounds: impl Iterator<Item = u8>) -> Message {
     let mut bits = message.bits().to_vec();
     let (first, second) = bits.split_at_mut(message.len() / 2);

@@ -1,6 +1,7 @@
 //! Counts and nouns in messages.
 
-/// Returns a number and its noun, which is given in the singular: `1 record`, `2 records`, `3 vertices`.
+/// Returns a number and its noun, which is given in the singular: `1 record`, `2 records`,
+/// `3 vertices`.
 pub fn counted(count: usize, noun: &str) -> String {
     match count {
         1 => format!("1 {noun}"),

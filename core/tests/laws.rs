@@ -260,8 +260,8 @@ fn clusters() -> VertexTable {
     VertexTable::new(coords).unwrap()
 }
 
-/// The stiffness matrix of linear finite elements: the sides a and b of a triangle that face two of its corners make
-/// an entry a·b / 4A. Triangles flatter than 1 : 100 are as stiff as those.
+/// The stiffness matrix of linear finite elements: the sides a and b of a triangle that face two of
+/// its corners make an entry a·b / 4A. Triangles flatter than 1 : 100 are as stiff as those.
 fn stiffness(coords: &[[f64; 2]], triangles: &[[u32; 3]]) -> Mat<f64> {
     let mut matrix = Mat::zeros(coords.len(), coords.len());
     for triangle in triangles {

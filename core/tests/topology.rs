@@ -16,8 +16,8 @@ use proptest::prelude::*;
 
 const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 
-/// Coordinates, the pairs of them that are joined, and which of these are sides of polygons, before duplicates are
-/// merged.
+/// Coordinates, the pairs of them that are joined, and which of these are sides of polygons, before
+/// duplicates are merged.
 #[derive(Debug, Clone, Default)]
 struct Sketch {
     coords: Vec<[f64; 2]>,
@@ -70,7 +70,8 @@ impl Sketch {
         let mut segments: Vec<[u32; 2]> = self.joined.iter().map(pair).filter(|[a, b]| a != b).collect();
         segments.sort_unstable();
         segments.dedup();
-        // Along a ring, labels go round in one direction or the other: two passes reach every corner.
+        // Along a ring, labels go round in one direction or the other: two passes reach every
+        // corner.
         let mut polygon_roots: Vec<u32> = (0..table.len() as u32).collect();
         let there: Vec<[u32; 2]> = self.sides.iter().map(pair).collect();
         for [a, b] in there.iter().chain(there.iter().rev()).chain(&there) {
@@ -87,9 +88,10 @@ fn turned([x, y]: [f64; 2], about: [f64; 2], angle: f64) -> [f64; 2] {
     [about[0] + cos * x - sin * y, about[1] + sin * x + cos * y]
 }
 
-/// Blocks of three houses, centimetres to metres apart: one with a corner on the wall of its neighbour, which has no
-/// vertex there, and all with a notch narrower than the mark is wide; roads around them and a point between. Of each
-/// the turn, the gap, the notch and the place of the corner.
+/// Blocks of three houses, centimetres to metres apart: one with a corner on the wall of its
+/// neighbour, which has no vertex there, and all with a notch narrower than the mark is wide; roads
+/// around them and a point between. Of each the turn, the gap, the notch and the place of the
+/// corner.
 fn town(blocks: &[(f64, f64, f64, f64)]) -> Sketch {
     let mut sketch = Sketch::default();
     for (number, &(angle, gap, notch, at)) in blocks.iter().enumerate() {
@@ -283,7 +285,8 @@ fn a_hole_that_touches_the_wall_stays_inside_to_the_last_bit() {
         let hole = corners(&[[0.0, 5.0], [4.0, 3.0], [4.0, 7.0]]);
         sketch.ring(&shell);
         sketch.ring(&hole);
-        contacts.push([shell[3], shell[0], hole[0]]); // with the square on the left of the first two
+        // This one is with the square on the left of the first two.
+        contacts.push([shell[3], shell[0], hole[0]]);
     }
     let town = sketch.survey();
     let side = |[a, b, p]: [[f64; 2]; 3]| orientation(a, b, p);

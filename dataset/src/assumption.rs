@@ -1,5 +1,5 @@
-//! Assumptions about maps whose CRS is missing or wrong: the CRS that their coordinates may be in, given the
-//! region of the earth where they should lie.
+//! Assumptions about maps whose CRS is missing or wrong: the CRS that their coordinates may be in,
+//! given the region of the earth where they should lie.
 
 use crate::{CoordinateSystem, Result, Survey, crs::reproject};
 use meshmark_core::vertices::VertexTable;
@@ -8,7 +8,8 @@ use meshmark_core::vertices::VertexTable;
 const PROJECTED_CRS: &str = include_str!("projected_crs.csv");
 /// Places are compared this much beyond a region, degrees: datums differ by up to a kilometre.
 const DATUM_DEGREES: f64 = 0.02;
-/// A region is also extended by this share of its size, as a suspect may reach beyond the reference.
+/// A region is also extended by this share of its size, as a suspect may reach beyond the
+/// reference.
 const MARGIN: f64 = 0.1;
 /// Areas of use are rounded, and maps reach a little beyond them.
 const AREA_MARGIN_DEGREES: f64 = 0.5;
@@ -80,16 +81,16 @@ fn sample(table: &VertexTable) -> Vec<[f64; 2]> {
     table.coords().iter().step_by(table.len().div_ceil(SAMPLE).max(1)).copied().collect()
 }
 
-/// Returns whether a good part of the map lies in the region of the reference; both are in the CRS of the
-/// reference.
+/// Returns whether a good part of the map lies in the region of the reference; both are in the CRS
+/// of the reference.
 pub fn overlaps(map: &Survey, reference: &Survey) -> bool {
     let Some(crs) = &reference.crs else { return true };
     let Some(region) = Region::covering(crs, &reference.data.vertices) else { return true };
     region.share(&crs.degrees(&sample(&map.data.vertices))) >= LEAST_SHARE
 }
 
-/// Lists the assumptions under which a map of raw coordinates lies in the region of the reference, the most
-/// usual first. `own` is the CRS that the map claims. Datums are not distinguished here.
+/// Lists the assumptions under which a map of raw coordinates lies in the region of the reference,
+/// the most usual first. `own` is the CRS that the map claims. Datums are not distinguished here.
 pub fn likely_assumptions(
     raw: &Survey,
     own: Option<&CoordinateSystem>,
@@ -116,8 +117,8 @@ pub fn likely_assumptions(
     likely
 }
 
-/// Lists the EPSG codes of the CRS in use at a place: degrees, web maps, UTM of its zone and the neighbouring
-/// ones, on both sides of the equator, and the grids that cover it.
+/// Lists the EPSG codes of the CRS in use at a place: degrees, web maps, UTM of its zone and the
+/// neighbouring ones, on both sides of the equator, and the grids that cover it.
 fn codes_at([longitude, latitude]: [f64; 2]) -> Vec<u32> {
     let mut codes = vec![4326, 3857];
     let zone = ((longitude + 180.0) / 6.0).floor() as i64;

@@ -1,4 +1,5 @@
-//! Coordinate reference systems: metres per unit, labels, and the traditional axis order everywhere.
+//! Coordinate reference systems: metres per unit, labels, and the traditional axis order
+//! everywhere.
 
 use crate::{Error, Result, crs_wkt as wkt};
 use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
@@ -22,8 +23,8 @@ impl CoordinateSystem {
         CoordinateSystem(srs)
     }
 
-    /// Creates the CRS of a layer; `None` where it is "undefined", as in GeoPackages that were written
-    /// without one.
+    /// Creates the CRS of a layer; `None` where it is "undefined", as in GeoPackages that were
+    /// written without one.
     pub fn of_layer(srs: SpatialRef) -> Option<Self> {
         let is_undefined = srs.name().is_some_and(|name| name.starts_with("Undefined "));
         (!is_undefined).then(|| Self::new(srs))
@@ -39,15 +40,16 @@ impl CoordinateSystem {
         self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
     }
 
-    /// Returns the name for messages: the code, such as "EPSG:3067", or the name of a CRS without one.
+    /// Returns the name for messages: the code, such as "EPSG:3067", or the name of a CRS without
+    /// one.
     pub fn brief_name(&self) -> String {
         let name = || self.0.name().filter(|name| !NO_NAMES.iter().any(|no| no.eq_ignore_ascii_case(name)));
         let or_name = self.0.authority().ok().or_else(name);
         or_name.or_else(|| self.0.to_proj4().ok()).unwrap_or_else(|| "unknown CRS".into())
     }
 
-    /// Returns the names of two different CRS for messages: brief names, with their definitions where those
-    /// are equal.
+    /// Returns the names of two different CRS for messages: brief names, with their definitions
+    /// where those are equal.
     pub fn names_apart(&self, other: &CoordinateSystem) -> [String; 2] {
         let names = [self, other].map(CoordinateSystem::brief_name);
         if names[0] != names[1] {
@@ -72,8 +74,8 @@ impl CoordinateSystem {
         CoordTransform::new(&self.0, &target.0)
     }
 
-    /// Converts points to degrees east of Greenwich and north, on the datum of this CRS; `None` where it has
-    /// no such place.
+    /// Converts points to degrees east of Greenwich and north, on the datum of this CRS; `None`
+    /// where it has no such place.
     pub(crate) fn degrees(&self, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
         let (mut x, mut y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
         let Ok(geographic) = self.0.geog_cs().map(CoordinateSystem::new) else {
@@ -123,8 +125,9 @@ impl CoordinateSystem {
         })
     }
 
-    /// Measures metres per unit at a place, the square root of the areal scale, by differences of 100 units
-    /// of length in longitude and latitude. An EPSG:3857 unit is half a metre at Helsinki.
+    /// Measures metres per unit at a place, the square root of the areal scale, by differences of
+    /// 100 units of length in longitude and latitude. An EPSG:3857 unit is half a metre at
+    /// Helsinki.
     fn measured_metres_per_unit(&self, place: [f64; 2]) -> Option<f64> {
         let local = Local::new(self)?;
         let [lon, lat] = local.around(&[place]);
@@ -169,8 +172,8 @@ impl Local {
         Some(Local { to_geographic, ellipsoid, step: 50.0 / crs.0.linear_units() })
     }
 
-    /// Returns longitudes and latitudes of the points left, right, below and above each place, and of the
-    /// place itself; they are not finite where the projection has no such place.
+    /// Returns longitudes and latitudes of the points left, right, below and above each place, and
+    /// of the place itself; they are not finite where the projection has no such place.
     fn around(&self, places: &[[f64; 2]]) -> [Vec<f64>; 2] {
         let s = self.step;
         let around =
@@ -209,8 +212,8 @@ pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
     Ok(CoordinateSystem::new(srs))
 }
 
-/// Returns metres on the ground for a map, by its CRS; without one a unit is a metre, unless every coordinate
-/// could be a degree.
+/// Returns metres on the ground for a map, by its CRS; without one a unit is a metre, unless every
+/// coordinate could be a degree.
 pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Result<Ground> {
     if let Some(crs) = crs {
         return crs.ground(table);

@@ -1,9 +1,9 @@
 //! Coordinates as decimal numbers, which GDAL writes to GeoJSON.
 //!
-//! GDAL rounds to a number of decimals or of significant figures, and then treats a run of zeros or nines at
-//! certain places as noise and ends the number there. This rule is the same from GDAL 3.6 to 3.12 and a
-//! function of the double: this module computes the values that a file may hold, and any other value is a
-//! difference.
+//! GDAL rounds to a number of decimals or of significant figures, and then treats a run of zeros or
+//! nines at certain places as noise and ends the number there. This rule is the same from GDAL 3.6
+//! to 3.12 and a function of the double: this module computes the values that a file may hold, and
+//! any other value is a difference.
 
 use meshmark_core::{counted, vertices::VertexTable};
 use std::fmt;
@@ -62,8 +62,8 @@ impl Digits {
         texts.iter().map(|text| text.parse().expect("a number that was just written")).collect()
     }
 
-    /// Returns how far a value in a file may be from the computed one: the conversion to decimal digits and
-    /// back loses the last bits.
+    /// Returns how far a value in a file may be from the computed one: the conversion to decimal
+    /// digits and back loses the last bits.
     fn slack(self, v: f64) -> f64 {
         if self == Digits::Every { 0.0 } else { 4.0 * f64::EPSILON * v.abs() }
     }
@@ -100,8 +100,8 @@ impl Digits {
         self.search(wanted, table.coords(), &mut vec![false; table.coords().len()])
     }
 
-    /// Returns whether `places` are `wanted` in a form that a file may hold, in any order: each of either
-    /// corresponds to one of the other.
+    /// Returns whether `places` are `wanted` in a form that a file may hold, in any order: each of
+    /// either corresponds to one of the other.
     pub fn are_kept(self, wanted: &[[f64; 2]], places: Vec<[f64; 2]>) -> bool {
         let Ok(table) = VertexTable::new(places) else { return wanted.is_empty() };
         let mut is_explained = vec![false; table.coords().len()];
@@ -109,8 +109,9 @@ impl Digits {
     }
 }
 
-/// Returns the number that GDAL writes when it treats the last digits as noise: after a run of five zeros or
-/// nines before the last digit, or of up to seven, shorter in larger numbers, before about the last eight.
+/// Returns the number that GDAL writes when it treats the last digits as noise: after a run of five
+/// zeros or nines before the last digit, or of up to seven, shorter in larger numbers, before about
+/// the last eight.
 fn without_noise(text: &str) -> Option<String> {
     let digits = text.as_bytes();
     let point = text.find('.')?;
@@ -171,8 +172,8 @@ mod tests {
     use proptest::{prelude::*, test_runner::Config};
     use std::path::Path;
 
-    /// Generates numbers like the longitudes and metres of maps, many of them with runs of zeros and nines
-    /// anywhere.
+    /// Generates numbers like the longitudes and metres of maps, many of them with runs of zeros
+    /// and nines anywhere.
     fn numbers() -> impl Strategy<Value = f64> {
         let run = || {
             proptest::sample::select(vec!["0", "9"])

@@ -1,5 +1,5 @@
-//! The largest coordinates of a place: larger numbers are an accident, beside which all other vertices would
-//! collapse.
+//! The largest coordinates of a place: larger numbers are an accident, beside which all other
+//! vertices would collapse.
 
 use crate::{CoordinateSystem, Error, Result};
 use meshmark_core::vertices::WIDEST;

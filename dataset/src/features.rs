@@ -16,8 +16,8 @@ pub struct FeatureGeometry {
     pub outline: Outline,
 }
 
-/// Reads the geometries of all features of the chosen layers (all when `None`), in the order of the dataset,
-/// without features that have none. `last_failure` is as in [`crate::Selection`].
+/// Reads the geometries of all features of the chosen layers (all when `None`), in the order of the
+/// dataset, without features that have none. `last_failure` is as in [`crate::Selection`].
 ///
 /// # Errors
 /// Fails for a layer that does not exist or cannot be read to its end, a malformed geometry, and
@@ -36,7 +36,8 @@ pub fn features(
         let extents: Vec<Extent> = crs.map(|crs| Extent::in_crs(crs.as_ref())).collect();
         for feature in layer.features() {
             for (column, extent) in extents.iter().enumerate() {
-                let Ok(geometry) = feature.geometry_by_index(column) else { continue }; // a null geometry
+                // A null geometry is an error.
+                let Ok(geometry) = feature.geometry_by_index(column) else { continue };
                 let fid = feature.fid();
                 let id = || fid.map_or("without id".into(), |fid| fid.to_string());
                 let failed = |reason: String| Error::Geometry { layer: name.clone(), fid: id(), reason };

@@ -18,7 +18,7 @@ pub struct Format {
 /// The encoding of coordinates.
 #[derive(Debug)]
 enum Coordinates {
-    /// Bit by bit.
+    /// Every bit is kept.
     Binary,
     /// As decimal numbers; RFC 7946 allows longitudes and latitudes of WGS 84 only.
     Json { always_rfc7946: bool },
@@ -69,14 +69,14 @@ impl Format {
         self.endings[0]
     }
 
-    /// Returns whether the driver writes native data: the parts of a GeoJSON text that GDAL's features do not
-    /// hold.
+    /// Returns whether the driver writes native data: the parts of a GeoJSON text that GDAL's
+    /// features do not hold.
     pub fn has_native_data(&self) -> bool {
         matches!(self.coordinates, Coordinates::Json { .. })
     }
 
-    /// Returns whether the driver reprojects a layer with these options to WGS 84, which would happen after
-    /// the marking.
+    /// Returns whether the driver reprojects a layer with these options to WGS 84, which would
+    /// happen after the marking.
     pub fn is_wgs84_only(&self, layer_options: Options) -> bool {
         match self.coordinates {
             Coordinates::Binary => false,

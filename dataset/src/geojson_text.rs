@@ -1,8 +1,10 @@
-//! The text of GeoJSON: this module finds positions and bounding boxes in it, so that they can be replaced
-//! and the rest stays unchanged. GDAL keeps the text of a GeoJSON file as *native data*, and writes from it
-//! what its own model of features does not hold: ids, foreign members, a fourth ordinate (RFC 7946).
+//! The text of GeoJSON: this module finds positions and bounding boxes in it, so that they can be
+//! replaced and the rest stays unchanged. GDAL keeps the text of a GeoJSON file as *native data*,
+//! and writes from it what its own model of features does not hold: ids, foreign members, a fourth
+//! ordinate (RFC 7946).
 //!
-//! The text may hold NaN, which a JSON parser refuses, so this module walks it; GDAL has parsed it before.
+//! The text may hold NaN, which a JSON parser refuses, so this module walks it; GDAL has parsed it
+//! before.
 
 use std::ops::Range;
 
@@ -18,8 +20,8 @@ pub enum Place {
     BoundingBox(Range<usize>),
 }
 
-/// Returns the positions and bounding boxes of a feature or a collection in the order of the text; `None`
-/// when it is not an object.
+/// Returns the positions and bounding boxes of a feature or a collection in the order of the text;
+/// `None` when it is not an object.
 pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     let mut places = Vec::new();
     for (key, value) in Text(text).members(0..text.len())? {
@@ -32,10 +34,10 @@ pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     Some(places)
 }
 
-/// Returns the native data of a feature or a collection without the parts that change with the marking or
-/// that its features hold themselves: attributes, bounding boxes, and positions except for ordinates after
-/// the third. Where there was a bounding box, GDAL makes a new one. The result is `None` when nothing is left
-/// that GDAL would write.
+/// Returns the native data of a feature or a collection without the parts that change with the
+/// marking or that its features hold themselves: attributes, bounding boxes, and positions except
+/// for ordinates after the third. Where there was a bounding box, GDAL makes a new one. The result
+/// is `None` when nothing is left that GDAL would write.
 ///
 /// ```
 /// # use meshmark_dataset::geojson_text::without_places;
@@ -54,7 +56,7 @@ pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
         let value = match key {
             b"type" | b"properties" => continue,
             b"bbox" => b"null".into(),
-            b"geometry" if all.says_more(&value)? => all.without_places_of_geometry(value)?,
+            b"geometry" if all.has_more(&value)? => all.without_places_of_geometry(value)?,
             b"geometry" => continue,
             _ => text[value].to_vec(),
         };
@@ -203,21 +205,21 @@ impl<'a> Text<'a> {
     }
 
     /// Returns whether a geometry has parts that GDAL's model does not hold.
-    fn says_more(&self, geometry: &Range<usize>) -> Option<bool> {
+    fn has_more(&self, geometry: &Range<usize>) -> Option<bool> {
         if !self.is(geometry, b'{') {
             return Some(false);
         }
         for (key, value) in self.members(geometry.clone())? {
-            let says_more = match key {
+            let has_more = match key {
                 b"type" | b"bbox" => false,
                 b"coordinates" => self.has_fourth_ordinate(value)?,
                 b"geometries" if self.is(&value, b'[') => {
-                    let each = self.elements(value)?.into_iter().map(|geometry| self.says_more(&geometry));
+                    let each = self.elements(value)?.into_iter().map(|geometry| self.has_more(&geometry));
                     each.collect::<Option<Vec<bool>>>()?.contains(&true)
                 }
                 _ => true,
             };
-            if says_more {
+            if has_more {
                 return Some(true);
             }
         }

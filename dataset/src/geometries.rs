@@ -67,8 +67,8 @@ pub struct Geometries {
     kinds: Vec<Step>,
     /// The number of the first chain of each geometry, ascending.
     firsts: Vec<u32>,
-    /// Geometries other than points, lines and polygons, as well-known binary: their chains do not describe
-    /// them completely.
+    /// Geometries other than points, lines and polygons, as well-known binary: their chains do not
+    /// describe them completely.
     others: BTreeMap<u32, Vec<u8>>,
 }
 
@@ -88,7 +88,8 @@ impl Geometries {
         self.firsts.is_empty()
     }
 
-    /// Returns a geometry with the vertices at `coords`, which are in canonical order, without Z and M.
+    /// Returns a geometry with the vertices at `coords`, which are in canonical order, without Z
+    /// and M.
     pub fn outline(&self, number: usize, coords: &[[f64; 2]]) -> Outline {
         let end =
             |ends: &[u32], number: usize, all: usize| ends.get(number + 1).map_or(all, |end| *end as usize);

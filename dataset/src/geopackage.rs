@@ -1,5 +1,5 @@
-//! Geometries in GeoPackages (OGC 12-128r18, 2.1.3): a header, usually with the bounding box, followed by
-//! well-known binary.
+//! Geometries in GeoPackages (OGC 12-128r18, 2.1.3): a header, usually with the bounding box,
+//! followed by well-known binary.
 
 use crate::wkb::{self, WkbError};
 use gdal::vector::Geometry;
@@ -8,10 +8,11 @@ use std::borrow::Cow;
 /// Prefixes of the tables of the standard, of SQLite and of spatial indexes.
 const RESERVED: [&str; 3] = ["gpkg", "sqlite_", "rtree_"];
 
-/// Characters with which GDAL lets no name of a GeoPackage layer begin.
+/// Characters that GDAL refuses at the beginning of the name of a GeoPackage layer.
 const NO_BEGINNING: &str = "`~!@#$%^&*()+-={}|[]\\:\";'<>?,./";
 
-/// Returns a name that a GeoPackage accepts for a layer of this name; other formats allow more names.
+/// Returns a name that a GeoPackage accepts for a layer of this name; other formats allow more
+/// names.
 pub fn safe_layer_name(name: &str) -> Cow<'_, str> {
     let begins = |start: &&str| name.get(..start.len()).is_some_and(|n| n.eq_ignore_ascii_case(start));
     match name.is_empty() || name.starts_with(|c| NO_BEGINNING.contains(c)) || RESERVED.iter().any(begins) {
@@ -28,8 +29,8 @@ const BOUNDS: usize = 8;
 /// The number of numbers at the end of the header, for every kind of bounding box.
 const NUMBERS: [usize; 5] = [0, 4, 6, 6, 8];
 
-/// Calls `f` with every coordinate pair, writes the result back and fits the bounding box along x and y.
-/// Returns the box, or `None` for a geometry without coordinates.
+/// Calls `f` with every coordinate pair, writes the result back and fits the bounding box along x
+/// and y. Returns the box, or `None` for a geometry without coordinates.
 ///
 /// # Errors
 /// [`WkbError`] for bytes that are not such a geometry, the error of `f` when it fails.
@@ -62,7 +63,8 @@ pub fn map_coordinates<E: From<WkbError>>(
 mod tests {
     use super::*;
 
-    /// Returns a geometry whose header has that kind of bounding box, all zeros, and the WKB of a text.
+    /// Returns a geometry whose header has that kind of bounding box, all zeros, and the WKB of a
+    /// text.
     fn blob(kind: u8, wkt: &str) -> Vec<u8> {
         let mut blob = vec![b'G', b'P', 0, kind << 1 | 1, 0, 0, 0, 0];
         blob.resize(BOUNDS + 8 * NUMBERS[usize::from(kind)], 0);

@@ -1,6 +1,6 @@
-//! GDAL datasets as vertices, and marked maps as files. Only this crate walks layers and geometries, so that
-//! the driver and the verifier see the same map; it also holds what both need to write one: formats, reading
-//! back, publication.
+//! GDAL datasets as vertices, and marked maps as files. Only this crate walks layers and
+//! geometries, so that the driver and the verifier see the same map; it also holds what both need
+//! to write one: formats, reading back, publication.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -33,7 +33,7 @@ pub mod workplace;
 
 pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
-pub use error::{Error, Result};
+pub use error::{Error, Result, file_error};
 pub use features::{FeatureGeometry, features};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};

@@ -1,5 +1,5 @@
-//! The names of marked views: `MESHMARK:` followed by the name of a dataset opens that dataset with marked
-//! geometry.
+//! The names of marked views: `MESHMARK:` followed by the name of a dataset opens that dataset with
+//! marked geometry.
 
 use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
 

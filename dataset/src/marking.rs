@@ -65,7 +65,8 @@ pub enum NotMoved {
 /// A map smaller than this many tolerances would be noise after its marking.
 const LEAST_TOLERANCES: f64 = 10.0;
 
-/// Number of features per layer in which coordinates as text are searched: some features may have none.
+/// Number of features per layer in which coordinates as text are searched: some features may have
+/// none.
 const FEATURES_TO_LOOK_AT: usize = 100;
 
 /// Fails for a map so small that its units must be wrong.
@@ -83,7 +84,8 @@ pub fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
     }
 }
 
-/// Fails where the error of the mark's one scale is so large that vertices would move further than wanted.
+/// Fails where the error of the mark's one scale is so large that vertices would move further than
+/// wanted.
 ///
 /// # Errors
 /// [`Error::UnevenScale`].
@@ -137,13 +139,13 @@ pub fn warnings(
 /// With this option CSV files keep no column of coordinates as text among the attributes.
 const NO_TEXT_OF_GEOMETRY: &str = "@KEEP_GEOM_COLUMNS=NO";
 
-/// The open options for any map. CSV files hold their coordinates as text, which would otherwise stay an
-/// attribute, and unmarked; layers of OpenStreetMap files must be read one at a time, whatever the
-/// configuration. With @ an option concerns only drivers that have it.
+/// The open options for any map. CSV files hold their coordinates as text, which would otherwise
+/// stay an attribute, and unmarked; layers of OpenStreetMap files must be read one at a time,
+/// whatever the configuration. With @ an option concerns only drivers that have it.
 pub const OPEN_OPTIONS: [&str; 2] = [NO_TEXT_OF_GEOMETRY, "@INTERLEAVED_READING=NO"];
 
-/// Returns a warning for a dataset with coordinates as text among its attributes, where they stay unmarked. A
-/// dataset from a CSV file may have them.
+/// Returns a warning for a dataset with coordinates as text among its attributes, where they stay
+/// unmarked. A dataset from a CSV file may have them.
 pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     let find = |mut layer: Layer| {
         let _turn = turn(dataset, &layer.name()).ok()?;
@@ -157,7 +159,8 @@ pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
     ))
 }
 
-/// What to say of a layer of a GeoJSON file whose features have foreign members that hold places.
+/// Returns the warning about a layer of a GeoJSON file whose features have foreign members that
+/// hold places.
 pub fn foreign_places(layer: &str) -> String {
     format!(
         "layer \"{layer}\" has geometries or bounding boxes in foreign members of its features, which stay as they are: with \
@@ -165,7 +168,8 @@ pub fn foreign_places(layer: &str) -> String {
     )
 }
 
-/// The first attribute that holds a geometry as text in one of the first features, whatever its name.
+/// Returns the first attribute that holds a geometry as text in one of the first features, whatever
+/// its name.
 fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
     let fields: Vec<_> = layer.defn().fields().map(|field| (field.name(), field.field_type())).collect();
     let is_wkt = |text: String| Geometry::from_wkt(&text).is_ok();

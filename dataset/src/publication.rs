@@ -1,9 +1,10 @@
 //! Publication: files made in workplaces appear in their places together, or none of them does.
 //!
-//! The order is record, reference, side files, main file; so a reader that sees the main file finds the
-//! others. New files are linked, not moved: a file in both places shows that a publication was interrupted,
-//! and the publication can be undone. The main file alone may replace another one, by a single rename. Side
-//! files in the way are moved into the workplace first, and back if the publication fails.
+//! The order is record, reference, side files, main file; so a reader that sees the main file finds
+//! the others. New files are linked, not moved: a file in both places shows that a publication was
+//! interrupted, and the publication can be undone. The main file alone may replace another one, by
+//! a single rename. Side files in the way are moved into the workplace first, and back if the
+//! publication fails.
 
 use crate::{Error, Result, error::file_error, file_id::same_file};
 use std::{
@@ -20,7 +21,8 @@ pub const JOURNAL: &str = "journal";
 /// The files of a publication.
 #[derive(Debug, Default)]
 pub struct Publication {
-    /// Moves of record, reference and side files from a workplace to their places, which must be free.
+    /// Moves of record, reference and side files from a workplace to their places, which must be
+    /// free.
     pub companions: Vec<Move>,
     /// Moves of the files of a replaced dataset from their places to where they are kept meanwhile.
     pub retired: Vec<Move>,
@@ -66,8 +68,8 @@ impl Publication {
             true => fs::rename(&self.main.from, &self.main.to)
                 .map_err(|e| file_error("replacing", &self.main.to, e))?,
         }
-        // The main file is in its place, so nothing may fail any more. If the power fails now, old and new
-        // files are both whole.
+        // The main file is in its place, so nothing may fail any more. If the power fails now, old
+        // and new files are both whole.
         drop(sync_folder(&self.main.to));
         Ok(())
     }
@@ -90,7 +92,8 @@ impl Publication {
         }
     }
 
-    /// Writes the content to disk: a power failure after the names are in place must not leave empty files.
+    /// Writes the content to disk: a power failure after the names are in place must not leave
+    /// empty files.
     fn sync_content(&self) -> Result<()> {
         for Move { from, .. } in self.companions.iter().chain([&self.main]) {
             File::open(from).and_then(|file| file.sync_all()).map_err(|e| file_error("writing", from, e))?;

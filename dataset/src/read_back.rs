@@ -1,7 +1,7 @@
 //! Reading back: this module checks that a file holds what was meant.
 //!
-//! Drivers of GDAL may fail silently, and formats round coordinates, reverse rings and reorder features; so
-//! the features of the written file are compared with those that were meant.
+//! Drivers of GDAL may fail silently, and formats round coordinates, reverse rings and reorder
+//! features; so the features of the written file are compared with those that were meant.
 
 use crate::{
     decimals::Digits,
@@ -10,6 +10,7 @@ use crate::{
 use gdal::vector::{Feature, Layer, LayerAccess};
 use meshmark_core::counted;
 use std::{
+    cmp::Ordering,
     fmt,
     hash::{DefaultHasher, Hash, Hasher},
 };
@@ -26,9 +27,13 @@ pub enum Difference {
         /// How many of the meant features have a null or an empty geometry.
         without_geometry: usize,
     },
+    /// Coordinates became equal with these digits, and the driver wrote one of them.
+    Merged(Digits),
     /// Any other difference, in a few words.
     Other(String),
 }
+
+const OTHER_FORMAT: &str = "choose another format or its options";
 
 impl From<String> for Difference {
     fn from(words: String) -> Self {
@@ -47,6 +52,7 @@ impl fmt::Display for Difference {
                 "{} were meant, {without_geometry} of them with a null or empty geometry, and {in_file} are there",
                 counted(*meant, "feature")
             ),
+            Difference::Merged(digits) => write!(f, "coordinates become equal, written with {digits}"),
             Difference::Other(words) => f.write_str(words),
         }
     }
@@ -59,7 +65,8 @@ impl Difference {
             Difference::Features { without_geometry: 1.., .. } => {
                 "leave them out (of a GeoPackage with -where \"NOT ST_IsEmpty(geom)\"), or choose another format"
             }
-            _ => "choose another format or its options",
+            Difference::Merged(digits) => digits.more().unwrap_or(OTHER_FORMAT),
+            _ => OTHER_FORMAT,
         }
     }
 }
@@ -102,7 +109,7 @@ impl ReadBack<'_> {
     /// Compares two layers; the coordinates of the second are added to `keep`.
     ///
     /// # Errors
-    /// The difference.
+    /// Returns the difference.
     pub fn layers(
         &self,
         meant: gdal::errors::Result<Layer>,
@@ -140,7 +147,7 @@ impl ReadBack<'_> {
         }
         counts.check()?;
         match sums[0] == sums[1] {
-            true => Ok(kept?),
+            true => kept,
             false => Err("other coordinates".to_string().into()),
         }
     }
@@ -148,7 +155,7 @@ impl ReadBack<'_> {
     /// Compares a layer with coordinates in the order of its features, bit by bit.
     ///
     /// # Errors
-    /// The difference.
+    /// Returns the difference.
     pub fn in_order(
         &self,
         mut in_file: Layer,
@@ -166,13 +173,14 @@ impl ReadBack<'_> {
         }
     }
 
-    fn feature(&self, a: Vec<[f64; 2]>, b: Vec<[f64; 2]>) -> Result<(), String> {
-        if a.len() != b.len() {
-            return Err("another number of coordinates".into());
-        }
-        match self.digits.are_kept(&a, b) {
-            true => Ok(()),
-            false => Err("other coordinates".into()),
+    /// Compares a feature of a format with few digits. The GeoJSON of GDAL 3.10, unlike 3.6,
+    /// drops a coordinate that equals the one before it.
+    fn feature(&self, a: Vec<[f64; 2]>, b: Vec<[f64; 2]>) -> Result<(), Difference> {
+        match a.len().cmp(&b.len()) {
+            Ordering::Greater => Err(Difference::Merged(self.digits)),
+            Ordering::Less => Err("another number of coordinates".to_string().into()),
+            Ordering::Equal if self.digits.are_kept(&a, b) => Ok(()),
+            Ordering::Equal => Err("other coordinates".to_string().into()),
         }
     }
 
@@ -211,7 +219,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_digest_knows_every_bit_and_no_order() {
+    fn coordinates_that_became_equal_need_more_digits() {
+        let line = [[0.0, 1.02], [0.0, 1.04], [2.0, 3.0]];
+        let read_back = ReadBack { digits: Digits::Decimals(1), place: &Some, last_failure: &|| None };
+        let difference = read_back.feature(line.to_vec(), vec![[0.0, 1.0], [2.0, 3.0]]).unwrap_err();
+        assert!(difference.to_string().ends_with("written with 1 decimal"), "{difference}");
+        assert!(difference.remedy().starts_with("raise COORDINATE_PRECISION"), "{}", difference.remedy());
+        let difference = read_back.feature(line[..2].to_vec(), line.to_vec()).unwrap_err();
+        assert_eq!(difference.remedy(), OTHER_FORMAT, "{difference}");
+    }
+
+    #[test]
+    fn the_digest_has_every_bit_and_no_order() {
         let ring = vec![[0.0, 1.0], [2.0, 3.0], [2.0, 1.0]];
         let turned: Vec<_> = ring.iter().rev().copied().collect();
         assert_eq!(digest(ring.clone()), digest(turned));

@@ -54,8 +54,9 @@ pub struct Selection<'a> {
     pub geometries: bool,
     /// A map of more vertices, duplicates included, is refused.
     pub most_vertices: usize,
-    /// Returns GDAL's last failure since the walk began, if there was one: drivers end a layer early on a
-    /// read error, and only the error handler of the process distinguishes that from the end of the layer.
+    /// Returns GDAL's last failure since the walk began, if there was one: drivers end a layer
+    /// early on a read error, and only the error handler of the process distinguishes that from the
+    /// end of the layer.
     pub last_failure: &'a dyn Fn() -> Option<String>,
 }
 
@@ -74,7 +75,8 @@ impl Default for Selection<'_> {
     }
 }
 
-/// Returns number and name of the chosen layers, in the order of the dataset. Two layers may have one name.
+/// Returns number and name of the chosen layers, in the order of the dataset. Two layers may have
+/// one name.
 pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Result<Vec<(usize, String)>> {
     let known: Vec<String> = dataset.layers().map(|layer| layer.name()).collect();
     if known.is_empty() {

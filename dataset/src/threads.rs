@@ -3,18 +3,20 @@ use std::{
     thread::{Builder, JoinHandle, available_parallelism},
 };
 
-/// Returns how many threads the user of GDAL allows: the configuration option GDAL_NUM_THREADS, a number or
-/// ALL_CPUS, which is the default.
+/// Returns how many threads the user of GDAL allows: the configuration option GDAL_NUM_THREADS, a
+/// number or ALL_CPUS, which is the default.
 pub fn threads() -> usize {
     let all = available_parallelism().map_or(1, usize::from);
     let given = gdal::config::get_config_option("GDAL_NUM_THREADS", "").unwrap_or_default();
     given.parse().map_or(all, |threads: usize| threads.clamp(1, 256))
 }
 
-/// A pool whose threads have ended when it is dropped. Those of rayon's own pool end later, possibly while
-/// the process ends, when GDAL has released its storage for them and reports an error.
+/// A pool whose threads have ended when it is dropped. Those of rayon's own pool end later,
+/// possibly while the process ends, when GDAL has released its storage for them and reports an
+/// error.
 pub struct ThreadPool {
-    /// Declared first, so that the threads are asked to end before they are awaited.
+    /// Declared first, so that the pool is dropped, and its threads begin to end, before they are
+    /// awaited.
     pool: rayon::ThreadPool,
     _threads: Joined,
 }

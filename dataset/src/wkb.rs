@@ -1,5 +1,5 @@
-//! Well-known binary geometries (OGC 06-103r4, ISO 13249-3): this module changes coordinate pairs of all
-//! geometry types in place and leaves Z and M unchanged.
+//! Well-known binary geometries (OGC 06-103r4, ISO 13249-3): this module changes coordinate pairs
+//! of all geometry types in place and leaves Z and M unchanged.
 
 /// The errors of the bytes of a geometry.
 #[derive(Debug, PartialEq, thiserror::Error)]
@@ -17,8 +17,8 @@ pub enum WkbError {
 
 const MOST_NESTED: usize = 64;
 
-/// The role of a coordinate pair: it begins a sequence (ring, line, point) or is joined to the pair before
-/// it.
+/// The role of a coordinate pair: it begins a sequence (ring, line, point) or is joined to the pair
+/// before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
     /// The first pair of a line, or a point.
@@ -31,8 +31,8 @@ pub enum Step {
     Next,
 }
 
-/// Calls `f` with every coordinate pair of a geometry and writes the result back. An empty point (NaN NaN)
-/// has none.
+/// Calls `f` with every coordinate pair of a geometry and writes the result back. An empty point
+/// (NaN NaN) has none.
 ///
 /// # Errors
 /// [`WkbError`] for bytes that are not a geometry, the error of `f` when it fails.
@@ -43,8 +43,9 @@ pub fn map_coordinates<E: From<WkbError>>(
     Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
 }
 
-/// Encodes a geometry of these chains, each with the kind of its first step: polygons with their holes,
-/// lines, and points for chains of one vertex; several form a multi-geometry or a collection.
+/// Encodes a geometry of these chains, each with the kind of its first step: polygons with their
+/// holes, lines, and points for chains of one vertex; several form a multi-geometry or a
+/// collection.
 pub fn of_chains(chains: &[Vec<[f64; 2]>], kinds: &[Step]) -> Vec<u8> {
     let mut parts: Vec<(u32, Vec<u8>)> = Vec::new();
     let mut rest = chains.iter().zip(kinds).peekable();
@@ -91,8 +92,8 @@ fn sequence_bytes(chain: &[[f64; 2]]) -> Vec<u8> {
     bytes
 }
 
-/// Returns whether a legal geometry consists of points, lines or polygons. All others may have arcs, which
-/// coordinates alone do not describe.
+/// Returns whether a legal geometry consists of points, lines or polygons. All others may have
+/// arcs, which coordinates alone do not describe.
 pub(crate) fn is_plain(wkb: &[u8]) -> bool {
     let code = wkb.get(1..5).and_then(|code| code.try_into().ok()).unwrap_or_default();
     let code = if wkb.first() == Some(&1) { u32::from_le_bytes(code) } else { u32::from_be_bytes(code) };

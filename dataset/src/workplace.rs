@@ -1,13 +1,11 @@
 //! Workplaces: private folders beside the places of files, in which the files are made before their
 //! publication.
 //!
-//! A workplace belongs to the process that holds the lock in it. A workplace whose lock is free was left by a
-//! killed process: the next process that writes to the same folder undoes a partial publication
-//! ([`crate::publication::recover`]) and removes the workplace.
+//! A workplace belongs to the process that holds the lock in it. A workplace whose lock is free was
+//! left by a killed process: the next process that writes to the same folder undoes a partial
+//! publication ([`crate::publication::recover`]) and removes the workplace.
 
-pub use crate::error::file_error;
-
-use crate::{Result, publication};
+use crate::{Result, error::file_error, publication};
 use std::{
     ffi::OsStr,
     fs::{self, File, Permissions, TryLockError},
@@ -110,8 +108,8 @@ fn sweep_one(folder: &Path, user: u32) {
     if !is_workplace || !folder.symlink_metadata().is_ok_and(is_ours) {
         return;
     }
-    // A workplace without a lock is empty and possibly about to be locked, or its process was killed while it
-    // removed it.
+    // A workplace without a lock is empty and possibly about to be locked, or its process was
+    // killed while it removed it.
     let lock = || File::open(folder.join(LOCK)).ok();
     let Some(file) = lock().or_else(|| if fs::remove_dir(folder).is_err() { lock() } else { None }) else {
         drop(fs::remove_dir_all(folder));

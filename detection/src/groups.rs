@@ -1,8 +1,8 @@
 //! Shifts of polygon groups: where a building went as a whole. No key is involved.
 //!
-//! Every pair of a group's vertex and a suspect vertex near it votes for the shift between them (a generalised
-//! Hough transform, Ballard 1981). A group that moved as a whole has one shift with the votes of nearly all its
-//! vertices, however far it moved and whatever its neighbours did.
+//! Every pair of a group's vertex and a suspect vertex near it votes for the shift between them (a
+//! generalised Hough transform, Ballard 1981). A group that moved as a whole has one shift with the
+//! votes of nearly all its vertices, however far it moved and whatever its neighbours did.
 
 use crate::matching::Near;
 use meshmark_core::map_data::MapData;
@@ -22,8 +22,8 @@ const CLEARLY_NEARER: f64 = 1.5;
 const MOST_VERTICES: usize = 64;
 const MOST_NEIGHBOURS: usize = 128;
 
-/// Returns the shift of every reference vertex with its polygon group, metres; `None` where there is no group or
-/// its shift is unclear.
+/// Returns the shift of every reference vertex with its polygon group, metres; `None` where there
+/// is no group or its shift is unclear.
 pub fn shifts_m(reference: &MapData, near: &Near) -> Vec<Option<[f64; 2]>> {
     let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     (0..).zip(&reference.polygon_roots).for_each(|(v, &root)| groups.entry(root).or_default().push(v));

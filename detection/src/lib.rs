@@ -11,7 +11,7 @@
 //! |---|---|
 //! | Where does the suspect lie on the reference? | [`registration`] |
 //! | Which vertex is which, and within which radius? | [`matching`] |
-//! | What moved the vertices besides the mark? | `tracking.rs`, and `deformation` of `meshmark-core` |
+//! | What moved the vertices besides the mark? | `tracking.rs`, `meshmark-core`'s `deformation` |
 //! | What evidence do the displacements give under a key? | [`Matched::demodulate`] |
 //! | Would a mark show on this suspect? | [`power`] |
 //! | Match, no match, or inconclusive, at what p-value? | [`decision`] |

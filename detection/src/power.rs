@@ -1,10 +1,11 @@
 //! Power: whether a mark would show on this suspect.
 //!
-//! A trial mark, of a key that nobody has, is laid on the suspect as if the suspect were made from a map with that
-//! mark: every vertex of the suspect moves as the nearest place on the linework of the reference does. Matching,
-//! tracking and demodulation are then repeated. The score of the trial mark thus includes what the suspect lost:
-//! displacements beyond the matching radius, vertices that are new on old lines, noise. It needs no model of what
-//! happened to the suspect, and neither the tested key nor a message.
+//! A trial mark, of a key that nobody has, is laid on the suspect as if the suspect were made from
+//! a map with that mark: every vertex of the suspect moves as the nearest place on the linework of
+//! the reference does. Matching, tracking and demodulation are then repeated. The score of the
+//! trial mark thus includes what the suspect lost: displacements beyond the matching radius,
+//! vertices that are new on old lines, noise. It needs no model of what happened to the suspect,
+//! and neither the tested key nor a message.
 
 use crate::{
     decision::p_any_message_log10,
@@ -24,7 +25,8 @@ use sha2::{Digest, Sha256};
 
 /// A key shows whatever its message where the p-value for any message is below 10 to this power.
 const KEY_SHOWS_LOG10: f64 = -9.0;
-/// A place of the suspect farther than this from the linework of the reference is foreign to it, metres.
+/// A place of the suspect farther than this from the linework of the reference is foreign to it,
+/// metres.
 const FOREIGN_M: f64 = 20.0;
 
 /// What a present mark would show.
@@ -73,7 +75,8 @@ impl Power {
     }
 }
 
-/// Returns a key that follows from the two maps, so that equal maps give equal power, and nobody can choose it.
+/// Returns a key that follows from the two maps, so that equal maps give equal power, and nobody
+/// can choose it.
 fn trial_key(matched: &Matched) -> SecretKey {
     let Matched { suspect, reference: Reference { data, .. }, .. } = matched;
     let text = format!("meshmark trial mark {} {}", suspect.vertices.digest(), data.vertices.digest());
@@ -110,7 +113,8 @@ impl<'a> Linework<'a> {
         [0, 1].map(|axis| (place[axis] - self.centre[axis]) * self.unit_m[axis])
     }
 
-    /// Returns where a place of the suspect goes when the vertices of the reference move, CRS units.
+    /// Returns where a place of the suspect goes when the vertices of the reference move, CRS
+    /// units.
     fn moved(&self, place: [f64; 2], displacement_m: &[[f64; 2]]) -> [f64; 2] {
         let at = self.plane(place);
         let Some(line) = self.tree.nearest_neighbor(&at) else { return place };

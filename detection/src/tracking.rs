@@ -151,8 +151,8 @@ impl Fit<'_> {
 }
 
 impl Followed {
-    /// Returns the number of vertices over the variance of their noise, 1/m²: about proportional to the
-    /// square of the score that a mark has.
+    /// Returns the number of vertices over the variance of their noise, 1/m²: about proportional to
+    /// the square of the score that a mark has.
     fn information(&self) -> f64 {
         self.matches.count as f64 / self.disturbance.deformation.noise_m.powi(2)
     }

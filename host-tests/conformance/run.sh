@@ -109,8 +109,8 @@ check() {
     ((status == 0)) && ! grep -qE 'ERROR|FAILURE' "$log" && grep -q 'Testing layer' "$log"
 }
 
-# check_map NAME MAP: through MESHMARK. Only when that fails does it matter whether the map's own driver does too: that of
-# GeoPackage in GDAL 3.12.1 does, over a count with two filters.
+# check_map NAME MAP: through MESHMARK. Only when that fails does it matter whether the map's own
+# driver does too: that of GeoPackage in GDAL 3.12.1 does, over a count with two filters.
 check_map() {
     if GDAL_DRIVER_PATH=$plugins check "$1-meshmark" "MESHMARK:$2" \
         -oo KEY="$scratch/key.json" -oo RECIPIENT="conformance test"; then

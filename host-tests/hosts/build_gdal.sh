@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Builds GDAL 3.12.1 with its programs and test_ogrsf into a new folder: the drivers that the tests use, on Debian's libraries.
-# Installs what it needs. Takes half an hour on two cores.
-# Usage: build_gdal.sh FOLDER DATA: DATA is the folder of data of another GDAL 3.12; the crate of gdal_source.sh has not all.
+# Builds GDAL 3.12.1 with its programs and test_ogrsf into a new folder: the drivers that the tests
+# use, on Debian's libraries. Installs what it needs. Takes half an hour on two cores.
+# Usage: build_gdal.sh FOLDER DATA: DATA is the folder of data of another GDAL 3.12; the crate of
+# gdal_source.sh has not all.
 set -euo pipefail
 
 readonly drivers=(GPKG SQLITE FLATGEOBUF CSV GML KML LIBKML TAB DXF VRT) # and Shapefile, GeoJSON, MEM, GTiff: always built

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Reads a report as people do, in Chromium, installed where it is missing: no error, no request, pages of A4. Pictures of
-# it go to the folder that is named: `host-tests/hosts/chromium.sh docs/images` draws those of the documents again.
+# Reads a report as people do, in Chromium, installed where it is missing: no error, no request,
+# pages of A4. Pictures of it go to the folder that is named:
+# `host-tests/hosts/chromium.sh docs/images` draws those of the documents again.
 pictures=$(realpath -m "${1:-/nonexistent}")
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -15,7 +16,7 @@ chromium() {
         >"$work/out" 2>"$work/log" || fail "Chromium fails on $page: $(tail -n 5 "$work/log")"
 }
 
-# What pages asked for over the network; Chromium asks for some things of its own.
+# Network requests of pages; Chromium makes some requests of its own.
 requests() {
     "${python[@]}" - "$work/net.json" <<'END'
 import json, sys
@@ -47,7 +48,7 @@ chromium --screenshot="$work/wrong.png" wrong.html
 for page in match inconclusive comparison; do
     chromium --screenshot="$work/$page.png" --window-size=900,1600 $page.html
     [ -z "$(console)" ] || fail "$page.html: $(console)"
-    [ -z "$(requests)" ] || fail "$page.html asks for $(requests)"
+    [ -z "$(requests)" ] || fail "$page.html requests $(requests)"
     chromium --no-pdf-header-footer --print-to-pdf="$work/$page.pdf" $page.html
     pages=$(pdfinfo "$work/$page.pdf" | awk '/^Pages:/ { print $2 }')
     pdfinfo "$work/$page.pdf" | grep -q '^Page size:.*(A4)' || fail "$page.html is not printed on A4"

@@ -1,5 +1,5 @@
-# Sourced by scripts that need a clean Debian; they have `fail` and a folder $work, in which the roots are made. Needs root,
-# or sudo.
+# Sourced by scripts that need a clean Debian; they have `fail` and a folder $work, in which the
+# roots are made. Needs root, or sudo.
 as_root=()
 [ "$(id -u)" -eq 0 ] || as_root=(sudo)
 trap '"${as_root[@]}" rm -rf "$work"' EXIT
@@ -13,9 +13,9 @@ new_root() {
         fail "debootstrap: $(tail -n 5 "$work/log")"
 }
 
-# in_root FOLDER WHAT COMMAND: runs COMMAND there, in /root; it trusts whom this machine trusts. The folders of the array
-# `mounts`, "FROM TO", are seen there while it runs and no longer, so that removing a root never reaches them. Sets
-# `seconds` to how long it took.
+# in_root FOLDER WHAT COMMAND: runs COMMAND there, in /root; it trusts whom this machine trusts. The
+# folders of the array `mounts`, "FROM TO", are seen there while it runs and no longer, so that
+# removing a root never reaches them. Sets `seconds` to how long it took.
 mounts=()
 in_root() {
     local folder=$1 what=$2 command=$3 mount from to begin=$EPOCHREALTIME

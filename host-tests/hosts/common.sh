@@ -1,5 +1,5 @@
-# Sourced by the scripts of this folder, which then are in a new folder with two keys, and have the driver of
-# target/release. What programs say is kept beside that folder.
+# Sourced by the scripts of this folder, which then are in a new folder with two keys, and have the
+# driver of target/release. The output of programs is kept beside that folder.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -34,7 +34,8 @@ install_missing() {
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
 }
 
-# verify WHAT REFERENCE SUSPECT OPTION...; options say what is expected: --record FILE or --recipient NAME.
+# verify WHAT REFERENCE SUSPECT OPTION...; options name the expected result: --record FILE or
+# --recipient NAME.
 verify() {
     local what=$1 reference=$2 suspect=$3
     "$meshmark" verify --key key.json --reference "$reference" "${@:4}" "$suspect" >"$work/verify.log" 2>&1 ||

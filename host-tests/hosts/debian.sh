@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# In a clean Debian of another suite, with the GDAL and the QGIS that it has: runs the tests, and the QGIS plugin with
-# qgis_plugin.sh. Installs debootstrap where it is missing, and needs root, or sudo.
+# In a clean Debian of another suite, with the GDAL and the QGIS that it has: runs the tests, and
+# the QGIS plugin with qgis_plugin.sh. Installs debootstrap where it is missing, and needs root, or
+# sudo.
 # Usage: debian.sh SUITE
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 source "$hosts/clean_debian.sh"
@@ -11,7 +12,8 @@ install_missing debootstrap
 new_root "$suite" "$debian"
 mounts=("$(rustc --print sysroot) /opt/rust" "$root /meshmark")
 
-# here WHAT COMMAND: in the checkout, where what is compiled stays, apart from that for this machine's GDAL.
+# here WHAT COMMAND: in the checkout, where what is compiled stays, apart from that for this
+# machine's GDAL.
 here() {
     in_root "$debian" "$1" "cd /meshmark && export CARGO_TARGET_DIR=/meshmark/target/$suite && $2"
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Builds GDAL 3.12 where it is missing, then driver and command with it, and runs on it the tests of every crate that knows
-# GDAL, and test_ogrsf. Also lets each of the two GDALs meet the driver of the other.
+# Builds GDAL 3.12 where it is missing, then driver and command with it, and runs on it the tests of
+# every crate that uses GDAL, and test_ogrsf. Also lets each of the two GDALs meet the driver of
+# the other.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 folder=$root/target/gdal-3.12

@@ -1,4 +1,7 @@
-"""Writes through MESHMARK with GDAL's Python: what succeeds is verified by python.sh, what fails must leave nothing."""
+"""Writes through MESHMARK with GDAL's Python; python.sh verifies the copies.
+
+A failure must leave no file.
+"""
 
 import os
 
@@ -59,7 +62,7 @@ def close_a_map_that_cannot_be_marked():
     feature = ogr.Feature(layer.GetLayerDefn())
     feature.SetGeometry(ogr.CreateGeometryFromWkt("POLYGON ((0 0,1 0,1 1,0 1,0 0))"))
     layer.CreateFeature(feature)
-    del layer, dataset  # raises nothing, as docs/driver.md says: Python prints that an exception is ignored
+    del layer, dataset  # raises no exception (docs/driver.md): Python prints that one is ignored
     assert "the whole map is" in gdal.GetLastErrorMsg(), gdal.GetLastErrorMsg()
 
 

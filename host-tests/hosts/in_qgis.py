@@ -1,4 +1,7 @@
-"""Reads and writes through MESHMARK with QGIS: what succeeds is verified by qgis.sh, what fails must leave nothing."""
+"""Reads and writes through MESHMARK with QGIS; qgis.sh verifies the copies.
+
+A failure must leave no file.
+"""
 
 import os
 import shutil
@@ -39,7 +42,7 @@ def export_marked_layer():
 
 
 def write(layer, target, name, key="key.json", overwrite="NO", **other):
-    """What QgsVectorFileWriter says: the code and the message."""
+    """Returns code and message of QgsVectorFileWriter."""
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName = "MESHMARK"
     options.layerName = "buildings"

@@ -1,4 +1,5 @@
-"""Runs in QGIS itself, by --code: marks through the context menu, verifies, and takes the pictures of docs/qgis.md.
+"""Runs in QGIS itself, by --code: marks through the context menu, verifies, and takes the pictures
+of docs/qgis.md.
 
 Environment: MESHMARK_WORK, a folder with map.gpkg, key.json and records/; MESHMARK_PICTURES, where to."""
 

@@ -1,4 +1,4 @@
-"""Works the plugin's dialogs as their user does: what they refuse, what the wheel does, where their buttons are."""
+"""Uses the plugin's dialogs as a user does: refusals, mouse wheel, buttons."""
 
 import os
 import sys
@@ -41,7 +41,7 @@ def widget_of(dialog, name):
 
 
 def refusal(given):
-    """What the dialog of the export says when it is run with these values."""
+    """Returns the warning of the export dialog when it is run with these values."""
     dialog = open_dialog("export")
     dialog.setParameters({"LAYERS": [f"{HERE}/map.gpkg"], "KEY": f"{HERE}/key.json", "RECORDS": HERE, **given})
     with mock.patch.object(qgis_dialog.QMessageBox, "warning") as warning:
@@ -51,7 +51,7 @@ def refusal(given):
     return warning.call_args[0][2]
 
 
-def says_what_is_missing():
+def missing_values_are_reported():
     output = {"OUTPUT": f"{HERE}/new.gpkg"}
     with folder.unchanged("qgis_dialogs: no recipient, or no file"):
         assert "No recipient is given" in refusal(output)
@@ -76,7 +76,7 @@ def is_in_order():
 
 
 def turn_wheel(over):
-    """Whether the box keeps the event for itself; who does not leaves it to the panel, which scrolls."""
+    """Returns whether the box handles the event; otherwise the panel scrolls."""
     middle = QPointF(over.rect().center())
     place = over.mapToGlobal(over.rect().center())
     event = QWheelEvent(
@@ -141,7 +141,7 @@ def no_map_is_compared_with_itself():
 
 
 def press_new_key(dialog, path):
-    """What is said, and whether as a warning."""
+    """Returns the message, and whether it is a warning."""
     buttons = [b for b in dialog.mainWidget().findChildren(QPushButton) if b.text() == "New key…"]
     assert len(buttons) == 1, buttons
     with mock.patch.object(keys, "QMessageBox") as box, mock.patch.object(keys, "QFileDialog") as files:
@@ -185,7 +185,7 @@ Processing.initialize()
 provider = MeshmarkProvider()
 assert QgsApplication.processingRegistry().addProvider(provider)
 QgsProject.instance().addMapLayers([layer("first"), layer("a layer with a very long name, " * 6)])
-says_what_is_missing()
+missing_values_are_reported()
 is_in_order()
 wheel_changes_nothing()
 buttons_are_in_reach()

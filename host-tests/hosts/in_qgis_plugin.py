@@ -1,4 +1,5 @@
-"""Runs the plugin's algorithms on layers that are no plain files, and cancels: qgis_plugin.sh verifies the copies."""
+"""Runs the plugin's algorithms on layers that are no plain files, and cancels runs; qgis_plugin.sh
+verifies the copies."""
 
 import json
 import os
@@ -63,11 +64,11 @@ def fails(why, name, layers, feedback=None, **options):
         except QgsProcessingException as error:
             assert why in str(error), error
         else:
-            raise AssertionError(f"no error that says {why}")
+            raise AssertionError(f"no error with {why}")
 
 
 class Cancelling(QgsProcessingFeedback):
-    """Cancels when the algorithm says something, or a little later."""
+    """Cancels when the algorithm logs a message, or a little later."""
 
     def __init__(self, text, seconds):
         super().__init__(False)
@@ -146,7 +147,7 @@ def verify_what_a_layer_shows():
 
 
 def verify_again():
-    """The second run of a session, and its layers, are as good as the first; no match names nobody."""
+    """The second run of a session gives equally good layers; without a match nobody is named."""
     import processing
 
     for run, (suspect, verdict, recipient) in enumerate(
@@ -163,7 +164,7 @@ def verify_again():
 
 
 def no_layers():
-    """What cannot be read is not taken for an empty layer, and a raster not for a traceback."""
+    """An unreadable layer does not count as empty, and a raster causes no traceback."""
     gdal.GetDriverByName("GTiff").Create(f"{HERE}/raster.tif", 4, 4)
     broken = QgsVectorLayer("url='http://127.0.0.1:9/' typename='x'", "broken", "WFS")
     for layer, why in [
@@ -177,7 +178,7 @@ def no_layers():
             except QgsProcessingException:
                 assert why in feedback.textLog() and "Traceback" not in feedback.textLog(), feedback.textLog()
             else:
-                raise AssertionError(f"no error that says {why}")
+                raise AssertionError(f"no error with {why}")
 
 
 def verification_fails(what, why, evidence, report, feedback=None):
@@ -195,7 +196,7 @@ def verification_fails(what, why, evidence, report, feedback=None):
         except QgsProcessingException as error:
             assert why in str(error), error
         else:
-            raise AssertionError(f"no error that says {why}")
+            raise AssertionError(f"no error with {why}")
 
 
 def both_files_or_none():
@@ -236,7 +237,7 @@ def impostor(name, *lines):
 
 
 def older_file_is_no_copy():
-    """Exit code 0, and a copy for somebody else in the place: the run fails, and says whose file that is not."""
+    """The run fails if ogr2ogr ends with exit code 0 and the copy is for another recipient."""
     buildings = of_map("buildings")
     export("older", [buildings])
     for_b = {"RECIPIENT": "B", "OUTPUT": f"{HERE}/older.gpkg"}
@@ -320,7 +321,7 @@ def run_in_a_model():
 
 
 def run_model(output, **subject):
-    """Whether it succeeds, and what it says. QGIS makes a temporary file of an output that is none of the model's."""
+    """Returns success and log. QGIS makes a temporary file of an output that the model lacks."""
     context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
     made = model(output is not None, **subject)
     made.initAlgorithm()

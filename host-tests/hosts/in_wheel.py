@@ -1,4 +1,4 @@
-"""Marks with the GDAL 3.12 of pyogrio's wheel, by reading and by writing, and when something fails."""
+"""Marks with the GDAL 3.12 of pyogrio's wheel, by reading and by writing, and provokes failures."""
 
 import os
 import pathlib

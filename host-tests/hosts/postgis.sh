@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Marks a table of a real PostGIS by reading, and checks that none is written to. Installs PostgreSQL and PostGIS
-# where they are missing; the server is a new one, in a temporary folder, reached by its socket alone.
+# Marks a table of a real PostGIS by reading, and checks that none is written to. Installs
+# PostgreSQL and PostGIS where they are missing; the server is a new one, in a temporary folder,
+# reached by its socket alone.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 # PostgreSQL does not run as root.

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Marks with the GDAL of Python: by the examples of docs/driver.md, and when something fails. Installs python3-gdal where
-# it is missing.
+# Marks with the GDAL of Python: by the examples of docs/driver.md, and when something fails.
+# Installs python3-gdal where it is missing.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 install_missing gdal-bin python3-gdal

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Marks in QGIS, without a screen: layers that PyQGIS reads and writes, and the algorithm gdal:convertformat. Installs
-# QGIS where it is missing.
+# Marks in QGIS, without a screen: layers that PyQGIS reads and writes, and the algorithm
+# gdal:convertformat. Installs QGIS where it is missing.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 install_missing gdal-bin qgis python3-qgis qgis-providers
@@ -16,16 +16,17 @@ verify "QgsVectorFileWriter, GeoPackage" written.gpkg.reference.gpkg written.gpk
 verify "QgsVectorFileWriter, Shapefile" written.shp.reference.gpkg written.shp --record written.shp.json
 verify "QgsVectorFileWriter, OVERWRITE=YES" replaced.reference.gpkg replaced.gpkg --record replaced.json
 
-# convert INPUT OUTPUT OPTIONS. The layer "roads through MESHMARK" is one of the project that in_qgis.py saved. The exit
-# code says nothing: 0 with and without an output.
+# convert INPUT OUTPUT OPTIONS. The layer "roads through MESHMARK" is one of the project that
+# in_qgis.py saved. The exit code is 0 with and without an output.
 convert() {
     "$qgis_process" run gdal:convertformat --project_path="$PWD/map.qgs" -- \
         INPUT="$1" OUTPUT="$2" OPTIONS="$3" >"$work/log" 2>&1 || true
 }
 
-# refused WHAT NAME SENTENCE: no file that begins with NAME, a pattern, is there, and the log says why.
+# refused WHAT NAME SENTENCE: no file that begins with NAME, a pattern, is there, and the log has
+# the reason.
 refused() {
-    grep -q "$3" "$work/log" || fail "$1: the log does not say why: $(cat "$work/log")"
+    grep -q "$3" "$work/log" || fail "$1: the log lacks the reason: $(cat "$work/log")"
     [ -z "$(find . -name "$2*" -o -name '.meshmark-*')" ] || fail "$1: files are left: $(ls -A)"
     passed "$1: nothing is left"
 }

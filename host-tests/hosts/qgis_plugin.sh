@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Installs the QGIS plugin from its zip into a profile of its own and marks, verifies and compares with it: by
-# qgis_process, by PyQGIS, and in QGIS itself on a virtual screen, which takes the pictures of docs/qgis.md (into the
-# folder $PICTURES when it is given). Installs QGIS and Xvfb where they are missing.
+# Installs the QGIS plugin from its zip into a profile of its own and marks, verifies and compares
+# with it: by qgis_process, by PyQGIS, and in QGIS itself on a virtual screen, which takes the
+# pictures of docs/qgis.md (into the folder $PICTURES when it is given). Installs QGIS and Xvfb
+# where they are missing.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 install_missing gdal-bin qgis python3-qgis qgis-providers python3-gdal unzip xvfb xauth
@@ -34,7 +35,7 @@ run() {
     "$qgis_process" run "meshmark:$1" -- "${@:2}" >"$work/log" 2>&1 || code=$?
 }
 
-says() {
+logged() {
     grep -qF -- "$2" "$work/log" || fail "$1: \"$2\" is not in the log: $(cat "$work/log")"
 }
 
@@ -47,25 +48,25 @@ two_layers=("LAYERS=$maps/map.gpkg|layername=buildings" "LAYERS=$maps/map.gpkg|l
 export_two=("${two_layers[@]}" KEY="$PWD/key.json" RECORDS="$maps/records")
 acme=(RECIPIENT="ACME GmbH")
 run export "${export_two[@]}" "${acme[@]}" OUTPUT="$marked"
-says "export" "$base.json"
+logged "export" "$base.json"
 verify "the plugin's export" "$base.reference.gpkg" "$marked" --record "$base.json"
 [ "$(ogrinfo -q "$marked" | cut -d' ' -f2 | tr '\n' ' ')" = "buildings roads " ] || fail "the layers are not those exported"
 cp "$marked" suspect.gpkg
 run export "${export_two[@]}" OUTPUT="$marked" RECIPIENT="Another Ltd" OVERWRITE=1
-says "a copy that is replaced" "$base-2.json"
+logged "a copy that is replaced" "$base-2.json"
 verify "a copy that is replaced" "$base.reference.gpkg" "$marked" --record "$base-2.json"
 
 run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json" RECORDS="$maps/records" \
     EVIDENCE_MAP="$maps/evidence.gpkg"
-says "verify" "RECIPIENT:	Another Ltd"
-says "verify" "VERDICT:	match"
+logged "verify" "RECIPIENT:	Another Ltd"
+logged "verify" "VERDICT:	match"
 [ "$(ogrinfo -q "$maps/evidence.gpkg" | cut -d' ' -f2 | tr '\n' ' ')" = "vertex_displacements patches " ] ||
     fail "the evidence map has not its two layers"
 run verify REFERENCE="$base.reference.gpkg" SUSPECT="$maps/map.gpkg" KEY="$PWD/key.json" RECORD="$base.json"
-says "verify, an unmarked map" "VERDICT:	no-match"
+logged "verify, an unmarked map" "VERDICT:	no-match"
 passed "verify names the recipient, and none for an unmarked map"
 run compare ORIGINAL="$base.reference.gpkg" MARKED="$marked"
-says "compare" "NEWLY_INVALID:	0"
+logged "compare" "NEWLY_INVALID:	0"
 grep -q 'DISPLACEMENT_RMS_M:	0\.[01]' "$work/log" || fail "compare: the displacement is not that of a mark: $(cat "$work/log")"
 passed "compare gives its figures"
 
@@ -76,13 +77,13 @@ mv suspect.gpkg example/
 cp key.json example/
 sed -n '/^```sh$/,/^```$/{//!p}' "$root/docs/qgis.md" | sed "/plugins enable/d; s|^qgis_process.bin|'$qgis_process'|" >"$work/example.sh"
 (cd example && bash -e "$work/example.sh") >"$work/log" 2>&1 || fail "the commands of docs/qgis.md fail: $(cat "$work/log")"
-says "the commands of docs/qgis.md" "RECIPIENT:	ACME GmbH"
+logged "the commands of docs/qgis.md" "RECIPIENT:	ACME GmbH"
 verify "the commands of docs/qgis.md" example/records/acme.reference.gpkg example/acme.gpkg --record example/records/acme.json
 
-# What fails says why and leaves everything as it was.
+# A failure names its reason and leaves everything as it was.
 (cd "$maps" && find . -type f -exec sha256sum {} + | sort -k2) >"$work/before"
 refused() {
-    says "$1" "$2"
+    logged "$1" "$2"
     [ "$code" -ne 0 ] || fail "$1: qgis_process ends with exit code 0"
     ! grep -q '^RECORD:' <(sed -n '/^Results/,$p' "$work/log") || fail "$1: a record is named"
     (cd "$maps" && find . -type f -exec sha256sum {} + | sort -k2) >"$work/after"
@@ -130,7 +131,7 @@ printf '\n[meshmark]\ndriver_folder=%s\ncommand=%s\n' "$build/gdalplugins" "$mes
     run export "${export_two[@]}" "${acme[@]}" OUTPUT="$PWD/by_settings.gpkg"
     run verify REFERENCE="$maps/records/by_settings.reference.gpkg" SUSPECT="$PWD/by_settings.gpkg" KEY="$PWD/key.json" \
         RECORD="$maps/records/by_settings.json"
-    says "the settings" "VERDICT:	match"
+    logged "the settings" "VERDICT:	match"
 )
 passed "driver and command are found by the settings"
 cp "$work/QGIS3.ini" "$profile/QGIS/QGIS3.ini"

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Marks with geopandas and the GDAL 3.12 in pyogrio's wheel; `make plugin-for-wheel` makes both it and the driver for it.
+# Marks with geopandas and the GDAL 3.12 in pyogrio's wheel; `make plugin-for-wheel` makes both it
+# and the driver for it.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 wheel=$root/target/wheel

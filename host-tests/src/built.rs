@@ -17,7 +17,8 @@ pub fn folder() -> Result<PathBuf> {
     Ok(if folder.ends_with("deps") { folder.with_file_name("") } else { folder.into() })
 }
 
-/// Refuses a file that is missing, or older than one of the sources that cargo lists in `rule`, a file NAME.d.
+/// Refuses a file that is missing, or older than one of the sources that cargo lists in `rule`, a
+/// file NAME.d.
 ///
 /// # Errors
 /// A sentence that names the file, the source and the remedy.

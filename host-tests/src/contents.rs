@@ -81,7 +81,8 @@ fn skeleton(wkb: &[u8]) -> Vec<u8> {
 /// Where every vertex of `before` is in `after`.
 ///
 /// # Panics
-/// Unless the two differ in nothing but coordinates, and each vertex went to one place wherever it occurs.
+/// Unless the two differ in nothing but coordinates, and each vertex went to one place wherever it
+/// occurs.
 #[track_caller]
 pub fn moves(before: &[LayerContents], after: &[LayerContents]) -> Vec<([f64; 2], [f64; 2])> {
     let names = |layers: &[LayerContents]| layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>();

@@ -1,10 +1,12 @@
 //! Faults while a marked map is written, and what must hold afterwards.
 
-use crate::plugin::{Host, Run};
+use crate::{
+    plugin::{Host, Run},
+    process,
+};
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/faults/fault.c");
@@ -22,7 +24,8 @@ pub enum Fault {
     FileSize(usize),
 }
 
-/// A host in which writing can be made to fail, with a small map, and perhaps a target that is there already.
+/// A host in which writing can be made to fail, with a small map, and perhaps a target that is
+/// there already.
 pub struct Scene {
     /// The host.
     pub host: Host,
@@ -117,11 +120,13 @@ impl Scene {
         outcome
     }
 
-    /// The same command again removes what a killed one left, and does its work where that is still to be done.
+    /// The same command again removes what a killed one left, and does its work where that is still
+    /// to be done.
     #[track_caller]
     fn check_next_run(&self, outcome: Outcome, context: &str) {
         let next = self.write(None);
-        let done_before = outcome == Outcome::Complete; // then the reference is in the way of another
+        // In this case the reference is in the way of another one.
+        let done_before = outcome == Outcome::Complete;
         assert_eq!(next.code == Some(0), !done_before, "{context}\nnext: {}", next.stderr);
         assert_eq!(self.outcome(context), Outcome::Complete);
         self.check_no_leftovers(Outcome::Complete, context);
@@ -233,8 +238,9 @@ impl Distribution {
         run(&self.host, &self.preload, self.host.meshmark().to_str().unwrap(), &arguments, fault)
     }
 
-    /// Runs with a fault and asserts that every copy that is there is complete, and that the same command again makes
-    /// the rest and leaves nothing else; how many copies there were before that.
+    /// Runs with a fault and asserts that every copy that is there is complete, and that the same
+    /// command again makes the rest and leaves nothing else; how many copies there were before
+    /// that.
     #[track_caller]
     pub fn survives(&self, fault: Fault) -> usize {
         let failed = self.run(Some(fault));
@@ -289,13 +295,12 @@ pub fn points(count: usize, properties: &str) -> String {
     format!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, features.join(","))
 }
 
-/// A shell script that runs its arguments with a limit on the size of files, as an error instead of a signal.
+/// A shell script that runs its arguments with a limit on the size of files, as an error instead of
+/// a signal.
 fn limited(bytes: usize) -> String {
     format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", bytes / 512) // POSIX: units of 512 bytes
 }
 
 fn compile(library: &Path) {
-    let arguments = ["-O1", "-shared", "-fPIC", SOURCE, "-ldl", "-o"];
-    let output = Command::new("cc").args(arguments).arg(library).output().expect("cc can be run");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    process::compile(Path::new(SOURCE), &["-O1", "-shared", "-fPIC", "-ldl"], library).unwrap();
 }

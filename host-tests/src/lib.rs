@@ -1,8 +1,10 @@
-//! What tests, studies and benchmarks share: the hosts that use the product, the product as its users have it, and what
-//! happens to maps.
+//! What tests, studies and benchmarks share: the hosts that use the product, the product as its
+//! users have it, and what happens to maps.
 //!
-//! - [`plugin`]: GDAL's programs with the driver, in a folder of their own; [`contents`]: what a dataset holds
-//! - [`product`]: a build of driver and command; [`process`]: a program with its time and memory
+//! - [`plugin`]: GDAL's programs with the driver, in a folder of their own; [`contents`]: what a
+//!   dataset holds
+//! - [`product`]: a build of driver and command; [`process`]: a program with its time and memory,
+//!   and the C compiler
 //! - [`attacks`]: from a map to a map; [`tiling`]: larger maps
 //! - [`experiment`]: maps are marked, copies attacked, suspects verified
 //! - [`faults`]: killed writers and full disks; [`vectors`]: the test vectors

@@ -1,6 +1,6 @@
 //! The driver as a user has it: GDAL's own programs, the plugin in a folder, a key file.
 
-use crate::built;
+use crate::{built, product::marking_arguments};
 use meshmark_core::key::SecretKey;
 use std::{
     fs,
@@ -116,8 +116,8 @@ impl Host {
         }
     }
 
-    /// The command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a recipient, the reference
-    /// `ref.gpkg`, the record `record.json` and more options.
+    /// The command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a recipient,
+    /// the reference `ref.gpkg`, the record `record.json` and more options.
     pub fn create_arguments(target: &str, source: &str, more: &[&str]) -> Vec<String> {
         let options = ["KEY=key.json", "RECIPIENT=ACME GmbH", "REFERENCE=ref.gpkg", "RECORD=record.json"];
         let named = |name: &str| {
@@ -163,11 +163,12 @@ impl Host {
 
     /// `ogr2ogr -f FORMAT output MESHMARK:source` with the key, a recipient and more options.
     pub fn mark(&self, format: &str, output: &str, source: &str, options: &[&str]) -> Run {
-        let source = format!("MESHMARK:{source}");
-        let mut arguments = vec!["-f", format, output, &source];
-        arguments.extend(["-oo", "KEY=key.json", "-oo", "RECIPIENT=ACME GmbH"]);
-        arguments.extend(options);
-        self.run("ogr2ogr", &arguments)
+        let fixed = ["KEY=key.json", "RECIPIENT=ACME GmbH"].map(String::from);
+        let fixed = marking_arguments(format, output, source, fixed);
+        self.run(
+            "ogr2ogr",
+            &fixed.iter().map(String::as_str).chain(options.iter().copied()).collect::<Vec<_>>(),
+        )
     }
 }
 
@@ -191,8 +192,8 @@ impl Run {
         self
     }
 
-    /// The failures of GDAL among its messages, but for the one that `ogr2ogr` ends with when a source does not open: in
-    /// GDAL 3.12 it is an `ERROR`, in 3.6 a `FAILURE`.
+    /// The failures of GDAL among its messages, but for the one that `ogr2ogr` ends with when a
+    /// source does not open: in GDAL 3.12 it is an `ERROR`, in 3.6 a `FAILURE`.
     pub fn errors(&self) -> Vec<&str> {
         let is_last_word = |line: &&str| line.starts_with("ERROR 1: Unable to open datasource `");
         self.stderr.lines().filter(|line| line.starts_with("ERROR ") && !is_last_word(line)).collect()

@@ -1,4 +1,4 @@
-//! A process, timed, with its peak memory.
+//! Processes: one timed, with its peak memory, and the C compiler.
 
 use crate::Result;
 use serde::Serialize;
@@ -18,7 +18,8 @@ const POLL: Duration = Duration::from_millis(2);
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Run {
     pub seconds: f64,
-    /// Seconds of processor time, user and system, of all threads, and of children that were waited for.
+    /// Seconds of processor time, user and system, of all threads, and of children that were waited
+    /// for.
     pub processor_s: f64,
     /// Of the process, or of it and its children together when there are any.
     pub peak_bytes: f64,
@@ -35,7 +36,8 @@ impl Run {
         let since = Instant::now();
         let mut child = command.spawn().map_err(|error| format!("{command:?}: {error}"))?;
         let mut peaks = HashMap::new();
-        // A process that has ended keeps its processor time, not its memory, until it is waited for.
+        // A process that has ended keeps its processor time, not its memory, until it is waited
+        // for.
         while !has_ended(&child) {
             note_peaks(child.id(), &mut peaks);
             sleep(POLL);
@@ -47,6 +49,19 @@ impl Run {
             return Err(format!("{command:?}: {status}\n{}", fs::read_to_string(messages)?).into());
         }
         Ok(Run { seconds, processor_s, peak_bytes: peaks.values().sum() })
+    }
+}
+
+/// Compiles a C source of a test or a benchmark into a program or a library.
+///
+/// # Errors
+/// The C compiler cannot be run, or fails: with what it printed.
+pub fn compile(source: &Path, arguments: &[&str], into: &Path) -> Result<()> {
+    let output = Command::new("cc").arg(source).args(arguments).arg("-o").arg(into).output();
+    let output = output.map_err(|error| format!("cc cannot be run: {error}"))?;
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(String::from_utf8_lossy(&output.stderr).into()),
     }
 }
 
@@ -111,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_process_is_waited_for_and_its_failure_is_told() {
+    fn a_process_is_waited_for_and_its_failure_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let shell = |script: &str, codes: &[i32]| {
             Run::of(Command::new("sh").args(["-c", script]), folder.path(), codes)

@@ -174,7 +174,8 @@ impl Product {
         self.export(source, marked, options)
     }
 
-    /// Marks `source` on export to a GeoPackage with these options of the driver and those of the product.
+    /// Marks `source` on export to a GeoPackage with these options of the driver and those of the
+    /// product.
     ///
     /// # Errors
     /// What ogr2ogr prints.
@@ -184,13 +185,12 @@ impl Product {
         marked: &Path,
         options: impl IntoIterator<Item = (&'static str, String)>,
     ) -> Result<()> {
-        let mut command = self.ogr2ogr();
-        command.args(["-q", "-f", "GPKG"]).arg(marked).arg(format!("MESHMARK:{}", source.display()));
-        for (name, value) in options {
-            command.arg("-oo").arg(format!("{name}={value}"));
-        }
-        command.args(self.options.iter().flat_map(|option| ["-oo", option]));
-        let output = command.output().map_err(|e| format!("ogr2ogr cannot be run: {e}"))?;
+        let options = options.into_iter().map(|(name, value)| format!("{name}={value}"));
+        let options = options.chain(self.options.iter().cloned());
+        let arguments =
+            marking_arguments("GPKG", &marked.display().to_string(), &source.display().to_string(), options);
+        let output = self.ogr2ogr().arg("-q").args(arguments).output();
+        let output = output.map_err(|e| format!("ogr2ogr cannot be run: {e}"))?;
         match output.status.success() {
             true => Ok(()),
             false => Err(format!("marking {}: {}", source.display(), printed(&output)).into()),
@@ -230,6 +230,18 @@ impl Product {
             code => Err(format!("meshmark verify, exit code {code:?}: {}", printed(&output)).into()),
         }
     }
+}
+
+/// Returns the arguments with which `ogr2ogr` marks `source` on export; `options` are those of the
+/// driver, NAME=value.
+pub fn marking_arguments(
+    format: &str,
+    marked: &str,
+    source: &str,
+    options: impl IntoIterator<Item = String>,
+) -> Vec<String> {
+    let fixed = ["-f".into(), format.into(), marked.into(), format!("MESHMARK:{source}")];
+    fixed.into_iter().chain(options.into_iter().flat_map(|option| ["-oo".into(), option])).collect()
 }
 
 fn printed(output: &Output) -> String {

@@ -75,7 +75,7 @@ pub fn coordinates(path: &Path) -> Vec<[f64; 2]> {
 }
 
 /// The marking of the reference, with all that it is made of.
-pub struct Marking {
+pub struct ReferenceMarking {
     /// The vertices of the reference map.
     pub reference: VertexTable,
     /// Metres on the ground.
@@ -89,7 +89,7 @@ pub struct Marking {
     patches: Patches,
 }
 
-impl Marking {
+impl ReferenceMarking {
     /// Marks the reference with today's code.
     ///
     /// # Panics
@@ -103,7 +103,7 @@ impl Marking {
         let message = key().recipient_message(RECIPIENT);
         let marked = embed(&on_ground, &key(), &message, &parameters).expect("it fits");
         let patches = Patches::new(&on_ground, &parameters).expect("it fits");
-        Marking { reference: map.data.vertices, ground, parameters, message, marked, patches }
+        ReferenceMarking { reference: map.data.vertices, ground, parameters, message, marked, patches }
     }
 
     /// Every intermediate value an implementer may want to compare, by the steps of the algorithm.
@@ -162,7 +162,8 @@ impl Marking {
         Basis::low_frequencies(&self.patches.as_slice()[number], self.carriers() + 1).expect("it converges")
     }
 
-    /// Analysis of coordinates relative to the map's centre: the r_i of the paper, which marking needs not.
+    /// Analysis of coordinates relative to the map's centre: the r_i of the paper, which marking
+    /// needs not.
     fn coordinate_spectrum(&self, basis: &Basis) -> Value {
         let local = self.reference.local(1.0);
         let axis = |axis: usize| {
@@ -219,7 +220,7 @@ impl Marking {
     }
 }
 
-impl Default for Marking {
+impl Default for ReferenceMarking {
     fn default() -> Self {
         Self::new()
     }
@@ -229,8 +230,8 @@ fn column(basis: &Basis, i: usize) -> Vec<f64> {
     (0..basis.vectors.nrows()).map(|v| basis.vectors[(v, i)]).collect()
 }
 
-/// The spectrum of a ring of 12 vertices, whose eigenvalues 1 − cos(πk/6) occur twice each: there the
-/// basis is not the solver's to choose.
+/// The spectrum of a ring of 12 vertices, whose eigenvalues 1 − cos(πk/6) occur twice each: there
+/// the basis is not the solver's to choose.
 fn ring() -> Value {
     let mut edges: Vec<[u32; 2]> = (0..11).map(|i| [i, i + 1]).chain([[0, 11]]).collect();
     edges.sort_unstable();

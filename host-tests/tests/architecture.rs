@@ -1,7 +1,9 @@
-//! The modules of a crate import each other in one direction: each can be read after those that it uses.
+//! The modules of a crate import each other in one direction: each can be read after those that it
+//! uses.
 //!
-//! The test reads `use` declarations and paths in the code, and follows re-exports to the module that defines an item.
-//! It does not see which module implements a method. `mod` declarations and re-exports of children are no imports.
+//! The test reads `use` declarations and paths in the code, and follows re-exports to the module
+//! that defines an item. It does not see which module implements a method. `mod` declarations and
+//! re-exports of children are no imports.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -1,4 +1,5 @@
-//! A map marked by the driver inside ogr2ogr is attacked, and `meshmark verify` says whose copy it is.
+//! A map marked by the driver inside ogr2ogr is attacked, and `meshmark verify` names its
+//! recipient.
 //!
 //! A few attacks on one map; the whole suite is the command `table2`.
 

@@ -1,4 +1,5 @@
-//! Data of every kind: each is marked by reading and by writing and verifies, or is refused with a sentence.
+//! Data of every kind: each is marked by reading and by writing and verifies, or is refused with a
+//! sentence.
 
 use gdal::{
     Dataset, DatasetOptions, DriverManager, GdalOpenFlags,
@@ -61,8 +62,8 @@ impl Map {
     }
 }
 
-/// Marks by reading and by writing, which makes one and the same map, verifies both, and returns the RMS length
-/// of the moves in CRS units.
+/// Marks by reading and by writing, which makes one and the same map, verifies both, and returns
+/// the RMS length of the moves in CRS units.
 #[track_caller]
 fn marks(map: &Map) -> f64 {
     let host = Host::new();
@@ -94,7 +95,7 @@ fn refuses(map: &Map, words: &str) {
     assert!(host.files() == before, "{:?}", host.names());
 }
 
-// --- maps ------------------------------------------------------------------------------------------
+// --- maps ----------------------------------------------------------------------------------------
 
 /// A number in 0..1 that depends on nothing but `i`.
 fn scattered(i: usize) -> f64 {
@@ -154,7 +155,7 @@ fn shapes(template: &str, more: &str) -> Vec<String> {
     houses(MANY).iter().map(shape).collect()
 }
 
-// --- kinds -----------------------------------------------------------------------------------------
+// --- kinds ---------------------------------------------------------------------------------------
 
 #[test]
 fn every_geometry_type_with_and_without_z_and_m() {
@@ -235,7 +236,8 @@ fn polar_latitudes() {
     marks(&Map::new("EPSG:4326", polygons(&degrees(15.0, 78.2))));
     marks(&Map::new("EPSG:4326", polygons(&degrees(-40.0, 89.9))));
     marks(&Map::new("EPSG:4326", polygons(&degrees(166.7, -77.85))));
-    marks(&Map::new("EPSG:3995", polygons(&at([-300.0, -400.0], [1.0, 1.0])))); // around the pole itself
+    // This map is around the pole itself.
+    marks(&Map::new("EPSG:3995", polygons(&at([-300.0, -400.0], [1.0, 1.0]))));
     marks(&Map::new("EPSG:3031", polygons(&at([300_000.0, -1_300_000.0], [1.0, 1.0]))));
 }
 

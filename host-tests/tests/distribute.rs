@@ -31,7 +31,8 @@ fn summary(host: &Host, map: &str) -> String {
     text.lines().filter(|line| !line.starts_with("INFO: ")).collect::<Vec<_>>().join("\n")
 }
 
-/// Adds what a copy might lose: ids with gaps, fields of all kinds with widths, nulls, a table, heights.
+/// Adds what a copy might lose: ids with gaps, fields of all kinds with widths, nulls, a table,
+/// heights.
 fn enrich(host: &Host) {
     let sql = |sql: &str| drop(host.run("ogrinfo", &["-q", "map.gpkg", "-sql", sql]).succeeds());
     sql("UPDATE buildings SET fid = fid + 1000 WHERE fid % 3 = 0");
@@ -70,8 +71,8 @@ fn answer(host: &Host, map: &str, sql: &str) -> String {
     text.lines().filter_map(|line| Some(line.split_once(" = ")?.1)).collect::<Vec<_>>().join("\n")
 }
 
-/// Every geometry has the same bytes in both, header and all; the indexes of the first are sound, hold the features that
-/// those of the second hold, and their boxes are no larger.
+/// Every geometry has the same bytes in both, header and all; the indexes of the first are sound,
+/// hold the features that those of the second hold, and their boxes are no larger.
 fn bytes_and_indexes_agree(host: &Host, copy: &str, driver: &str) {
     for layer in ["buildings", "roads", "heights", "arcs"] {
         let bytes = format!("SELECT hex(geom) AS h FROM {layer} WHERE geom NOT NULL ORDER BY fid");
@@ -164,7 +165,8 @@ fn one_layer_goes_into_every_format_as_by_the_driver() {
     assert!(!host.path("many").exists());
 }
 
-/// Sorted, and without numbers: FlatGeobuf orders features by place, before the mark here and after it in the driver.
+/// Sorted, and without numbers: FlatGeobuf orders features by place, before the mark here and after
+/// it in the driver.
 fn in_any_order(mut features: Vec<FeatureContents>) -> Vec<FeatureContents> {
     features.iter_mut().for_each(|feature| feature.fid = None);
     features.sort_by(|a, b| a.attributes.cmp(&b.attributes));
@@ -323,7 +325,8 @@ fn a_distribution_that_is_killed_or_has_no_disk_is_finished_by_the_next_run() {
         assert!(seen.contains(&0) && seen.iter().any(|&copies| copies > 0), "{seen:?}");
         for bytes in [4096, 81920] {
             distribution.reset();
-            assert_eq!(distribution.survives(Fault::FileSize(bytes)), 0); // what ogr2ogr copies is larger
+            // The copy of ogr2ogr is larger.
+            assert_eq!(distribution.survives(Fault::FileSize(bytes)), 0);
         }
         for seconds in [0.05, 0.2, 0.5] {
             distribution.reset();

@@ -1,5 +1,5 @@
-//! The commands of the documents, as they stand there. Those of docs/verifier.md are run by the verifier's own tests, those of
-//! docs/qgis.md and the Python of docs/driver.md by `make hosts`.
+//! The commands of the documents, as they stand there. Those of docs/verifier.md are run by the
+//! verifier's own tests, those of docs/qgis.md and the Python of docs/driver.md by `make hosts`.
 
 use meshmark_host_tests::plugin::{Host, fixture, library};
 use std::{
@@ -24,7 +24,8 @@ fn commands(block: &str) -> Vec<String> {
     joined.lines().filter(is_own).map(String::from).collect()
 }
 
-/// Runs a script where a map, a list, the key and the fixtures are; `suspect.gpkg` is what will be `marked.gpkg`.
+/// Runs a script where a map, a list, the key and the fixtures are; `suspect.gpkg` is what will be
+/// `marked.gpkg`.
 fn run(script: &str) -> Output {
     let host = Host::new();
     if script.contains("keygen key.json") {

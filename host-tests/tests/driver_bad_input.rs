@@ -202,7 +202,8 @@ fn a_coordinate_that_is_no_number_is_found_by_layer_and_feature() {
     let host = Host::new();
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         host.run("ogr2ogr", &["-f", "ESRI Shapefile", "roads.shp", &map(), "roads"]).succeeds();
-        // The second point of the first line: after the file's header, the record's, box, counts, one part.
+        // The second point of the first line: after the file's header, the record's, box, counts,
+        // one part.
         let y = 100 + 8 + 4 + 32 + 8 + 4 + 16 + 8;
         let mut bytes = fs::read(host.path("roads.shp")).unwrap();
         bytes[y..y + 8].copy_from_slice(&bad.to_le_bytes());
@@ -305,7 +306,7 @@ fn another_record_is_never_overwritten() {
     fs::write(host.path("acme.json"), "something else").unwrap();
     refuses_map(&host, &map(), &["-oo", "RECORD=acme.json"], &["RECORD=acme.json", "move it away"]);
     host.mark("GPKG", "a.gpkg", &map(), &["-oo", "RECORD=a.json"]).succeeds();
-    let words = ["RECORD=a.json", "says something else"];
+    let words = ["RECORD=a.json", "has other content"];
     refuses_map(&host, &map(), &["-oo", "RECORD=a.json", "-oo", "AMPLITUDE=0.2"], &words);
 }
 
@@ -465,7 +466,8 @@ fn a_writer_that_truncates_the_source_all_the_same_leaves_a_saved_copy() {
         let host = Host::new();
         host.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]);
         let original = fs::read(host.path(name)).unwrap();
-        // The driver reads the command line of ogr2ogr alone; this is any other program that writes.
+        // The driver reads the command line of ogr2ogr alone; this is any other program that
+        // writes.
         fs::copy(in_path("ogr2ogr"), host.path("export")).unwrap();
         let source = format!("MESHMARK:{name}");
         let options = ["-oo", "KEY=key.json", "-oo", "RECIPIENT=B"];

@@ -232,9 +232,10 @@ fn the_key_may_come_from_the_configuration_and_the_secret_is_seen_nowhere() {
     }
 }
 
-// --- targets that are there ------------------------------------------------------------------------
+// --- targets that are there ----------------------------------------------------------------------
 
-/// Runs ogr2ogr, which must fail with a sentence that holds all of `words` and leave everything as it was.
+/// Runs ogr2ogr, which must fail with a sentence that holds all of `words` and leave everything as
+/// it was.
 #[track_caller]
 fn refuses(host: &Host, run: impl FnOnce() -> Run, words: &[&str]) {
     let before = host.files();

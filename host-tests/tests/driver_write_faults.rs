@@ -1,5 +1,5 @@
-//! Whatever goes wrong while a marked map is written: afterwards there is the complete verified output or what
-//! was there before, and exit code 0 only in the first case.
+//! Whatever goes wrong while a marked map is written: afterwards there is the complete verified
+//! output or what was there before, and exit code 0 only in the first case.
 
 use gdal_sys::{CPLErr, GDALDatasetH, OGRErr, OGRFieldType, OGRLayerH, OGRwkbGeometryType};
 use libloading::Library;
@@ -21,7 +21,8 @@ fn source(name: &str) -> String {
     fixture(name).display().to_string()
 }
 
-/// Asserts that ogr2ogr fails with a sentence that holds `words`, and that nothing is written or left.
+/// Asserts that ogr2ogr fails with a sentence that holds `words`, and that nothing is written or
+/// left.
 #[track_caller]
 fn fails(host: &Host, target: &str, source: &str, more: &[&str], words: &[&str]) {
     let before = host.files();
@@ -33,7 +34,7 @@ fn fails(host: &Host, target: &str, source: &str, more: &[&str], words: &[&str])
     assert!(host.files() == before, "{:?}", host.names());
 }
 
-// --- the process or the disk fails -----------------------------------------------------------------
+// --- the process or the disk fails ---------------------------------------------------------------
 
 /// Calls to fail at: all near the end, where files are published, and some before.
 fn places(calls: usize, some: usize) -> Vec<usize> {
@@ -93,7 +94,7 @@ fn a_file_that_cannot_grow_fails_without_a_trace_in_every_format() {
     }
 }
 
-// --- the host fails --------------------------------------------------------------------------------
+// --- the host fails ------------------------------------------------------------------------------
 
 #[test]
 fn a_map_that_cannot_be_marked_is_not_written() {
@@ -146,7 +147,8 @@ fn transactions_of_any_size_make_the_same_map() {
         map
     };
     let mut seen = Vec::new();
-    // Without transactions ogr2ogr of GDAL 3.6 commits all the same, which fails as with any database.
+    // Without transactions ogr2ogr of GDAL 3.6 commits all the same, which fails as with any
+    // database.
     let before = host.files();
     let without = host.create("out.gpkg", &source("kotka.gpkg"), &["-gt", "0"]);
     if without.code == Some(0) {
@@ -177,7 +179,7 @@ fn a_source_that_ends_early_makes_no_map() {
     }
 }
 
-// --- the bare path: what GDAL does not let a driver prevent ----------------------------------------
+// --- the bare path: what GDAL does not let a driver prevent --------------------------------------
 
 #[test]
 fn without_the_prefix_nothing_marked_is_written_and_a_new_file_is_refused() {
@@ -212,7 +214,7 @@ fn without_the_prefix_gdal_deletes_a_file_that_is_there_or_extends_it_unmarked()
     }
 }
 
-// --- hosts that use the library --------------------------------------------------------------------
+// --- hosts that use the library ------------------------------------------------------------------
 
 /// A host in this process. GDAL's last error is one per thread, its drivers are one per process.
 struct InProcess {
@@ -225,8 +227,8 @@ static ALONE: Mutex<()> = Mutex::new(());
 impl InProcess {
     fn new() -> Self {
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-        // SAFETY: loading the plugin runs no code; the entry point takes no arguments. It stays loaded, as GDAL
-        // keeps its drivers.
+        // SAFETY: loading the plugin runs no code; the entry point takes no arguments. It stays
+        // loaded, as GDAL keeps its drivers.
         unsafe {
             let plugin = Box::leak(Box::new(Library::new(library()).unwrap()));
             gdal_sys::GDALAllRegister();

@@ -1,4 +1,5 @@
-//! Every format there is a use for, end to end: marked by GDAL's own programs, read by `meshmark verify`.
+//! Every format there is a use for, end to end: marked by GDAL's own programs, read by
+//! `meshmark verify`.
 
 use meshmark_host_tests::plugin::{Host, fixture};
 use std::fs;
@@ -11,7 +12,7 @@ fn kotka() -> String {
 const BARE: [&str; 2] = ["-sql", "SELECT geom FROM buildings"];
 const LAYER: [&str; 1] = ["buildings"];
 
-// --- reading ---------------------------------------------------------------------------------------
+// --- reading -------------------------------------------------------------------------------------
 
 /// A map in one format, made from a GeoPackage, marked by reading into the same format.
 struct Read {
@@ -32,7 +33,8 @@ const PLAIN: Read = Read { format: "", ending: "", source: &LAYER, options: &[],
 /// These formats do not say which CRS they are in.
 const CRS: [&str; 2] = ["-oo", "SRS=EPSG:3067"];
 
-/// From GDAL 3.11 on the column is named after the source's, and only one named `WKT` is read again.
+/// From GDAL 3.11 on the column is named after the source's, and only one named `WKT` is read
+/// again.
 const AS_WKT: [&str; 4] = ["-lco", "GEOMETRY=AS_WKT", "-lco", "GEOMETRY_NAME=WKT"];
 
 const READ: &[Read] = &[
@@ -117,7 +119,7 @@ fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
     }
 }
 
-// --- writing ---------------------------------------------------------------------------------------
+// --- writing -------------------------------------------------------------------------------------
 
 const IN_DEGREES: [&str; 3] = ["buildings", "-t_srs", "EPSG:4326"];
 
@@ -199,7 +201,8 @@ fn a_marked_map_that_is_converted_carries_the_message() {
     }
 }
 
-/// A grid of houses, some of whose marked longitudes lie just beside a round number: there GDAL ends numbers early.
+/// A grid of houses, some of whose marked longitudes lie just beside a round number: there GDAL
+/// ends numbers early.
 fn houses_on_a_round_meridian() -> String {
     let house = |number: u32| {
         let jitter = |n: u32| f64::from(number * 7919 % 101 + n * 13) * 1e-7;
@@ -247,7 +250,7 @@ fn any_number_of_digits_that_leaves_the_message_readable_is_written() {
 fn too_few_digits_for_the_message_are_refused_by_their_name() {
     let cases = [
         ("COORDINATE_PRECISION=4", "written with 4 decimals", "raise COORDINATE_PRECISION"),
-        ("COORDINATE_PRECISION=1", "written with 1 decimal:", "raise COORDINATE_PRECISION"),
+        ("COORDINATE_PRECISION=1", "written with 1 decimal", "raise COORDINATE_PRECISION"),
         ("SIGNIFICANT_FIGURES=5", "written with 5 significant figures", "raise SIGNIFICANT_FIGURES"),
     ];
     for (digits, said, remedy) in cases {
@@ -256,11 +259,13 @@ fn too_few_digits_for_the_message_are_refused_by_their_name() {
         let run = host.create("out.geojson", "map.geojson", &["-lco", digits]);
         assert_eq!(run.code, Some(1), "{digits}: {}", run.stderr);
         assert!(run.stderr.contains(said) && run.stderr.contains(remedy), "{digits}: {}", run.stderr);
+        assert!(!run.stderr.contains("1 decimals"), "{digits}: {}", run.stderr);
         assert_eq!(host.names(), ["key.json", "map.geojson"], "{digits}");
     }
 }
 
-/// A copy of kotka's buildings in which so many features have a null geometry and one has an empty one.
+/// A copy of kotka's buildings in which so many features have a null geometry and one has an empty
+/// one.
 fn with_null_and_empty(host: &Host) {
     host.run("ogr2ogr", &["map.gpkg", &kotka(), "buildings"]).succeeds();
     let null = "INSERT INTO buildings (geom) VALUES (NULL), (NULL), (ST_GeomFromText('POLYGON EMPTY'))";
@@ -287,6 +292,9 @@ fn features_that_a_format_leaves_out_are_counted_and_the_remedy_helps() {
     let distributed = host.run(command.to_str().unwrap(), &[&list[..], &["map.gpkg"]].concat());
     for (way, run) in [("writing", host.create("out.fgb", "map.gpkg", &[])), ("distribute", distributed)] {
         assert!(run.code != Some(0), "{way}: {}", run.stderr);
+        if run.stderr.contains("NULL geometry not supported") {
+            continue; // GDAL 3.10 refuses them itself
+        }
         for word in ["\"buildings\"", "3 of them with a null or empty geometry", "NOT ST_IsEmpty(geom)"] {
             assert!(run.stderr.contains(word), "{way}: {word:?} is not in: {}", run.stderr);
         }

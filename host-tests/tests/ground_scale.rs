@@ -1,4 +1,5 @@
-//! Metres are on the ground where the vertex is: the scale of a projected CRS differs over a large map.
+//! Metres are on the ground where the vertex is: the scale of a projected CRS differs over a large
+//! map.
 
 use meshmark_host_tests::plugin::Host;
 use serde_json::{Value, json};
@@ -101,7 +102,8 @@ fn a_comparison_measures_every_vertex_where_it_is() {
     let run = host.run(command.to_str().unwrap(), &["compare", "--json", "before.geojson", "after.geojson"]);
     let compared: Value = serde_json::from_str(&run.succeeds().stdout).unwrap();
     let moved = |figure: &str| compared["displacement"][figure].as_f64().unwrap();
-    // A unit is a metre at the equator, and at 60° half of one on a sphere and 0.5013 m on the ellipsoid.
+    // A unit is a metre at the equator, and at 60° half of one on a sphere and 0.5013 m on the
+    // ellipsoid.
     assert!((moved("max_m") - 1.0).abs() < 1e-3, "{compared}");
     let rms_m = ((1.0 + 0.5013f64.powi(2)) / 2.0).sqrt();
     assert!((moved("rms_m") - rms_m).abs() < 1e-3, "{compared}");

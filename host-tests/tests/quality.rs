@@ -1,4 +1,5 @@
-//! Marking through the driver keeps real maps as good as they were, and the message is read from every kind of mark.
+//! Marking through the driver keeps real maps as good as they were, and the message is read from
+//! every kind of mark.
 
 use meshmark_core::options::{Laplacian, Rigidity};
 use meshmark_host_tests::plugin::{Host, library};

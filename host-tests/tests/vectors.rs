@@ -1,14 +1,14 @@
 //! Today's code makes the test vectors of fixtures/vectors again.
 
 use meshmark_core::{key::SecretKey, record::Record};
-use meshmark_host_tests::vectors::{self, Marking, differences};
+use meshmark_host_tests::vectors::{self, ReferenceMarking, differences};
 use serde_json::{Value, json};
 use std::{fs, sync::LazyLock};
 
 /// Another processor rounds otherwise; nothing else may differ. Metres, and what has no unit.
 const TOLERANCE: f64 = 1e-9;
 
-static MARKING: LazyLock<Marking> = LazyLock::new(Marking::new);
+static MARKING: LazyLock<ReferenceMarking> = LazyLock::new(ReferenceMarking::new);
 
 fn text(file: &str) -> String {
     fs::read_to_string(vectors::folder().join(file)).unwrap()

@@ -36,8 +36,8 @@ fn the_message_is_read_without_a_record() {
     assert!(report["bit_errors"].is_null() && report["p_value_log10"].is_null());
 }
 
-/// A copy as it was before messages were whitened: its message is what the key whitens to these bits, and its record
-/// says nothing of that.
+/// A copy as it was before messages were whitened: its message is what the key whitens to these
+/// bits, and its record has no field for it.
 fn mark_unwhitened(host: &Host, bits: &str, name: &str) {
     let message = host.key().unwhitened(&Message::from_hex(bits).unwrap()).to_hex();
     let (copy, path) = (format!("{name}.gpkg"), format!("{name}.json"));
@@ -252,7 +252,8 @@ fn a_suspect_in_another_crs_is_reprojected() {
     }
 }
 
-/// The marked map's coordinates in an EPSG CRS, perhaps y before x, under a label of another CRS or none.
+/// The marked map's coordinates in an EPSG CRS, perhaps y before x, under a label of another CRS or
+/// none.
 fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
     let mut map = reproject::reproject(&Map::read(&host.path("marked.gpkg")).unwrap(), epsg, None).unwrap();
     if swapped {
@@ -264,7 +265,8 @@ fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
     map.write(&host.path("suspect.gpkg")).unwrap();
 }
 
-/// What the report says of these coordinates. EPSG:3067, the reference's own, is UTM zone 35 by another name.
+/// Returns the report's entry for these coordinates. EPSG:3067, the reference's own, is UTM zone 35
+/// by another name.
 fn read_as(epsg: u32, swapped: bool) -> Value {
     let epsg = if epsg == 32635 { 3067 } else { epsg };
     json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped })

@@ -44,9 +44,10 @@ int MeshmarkDataset::TestCapability(const char *capability) MESHMARK_CONST
     return FALSE;
 }
 
-// While a query is open, the source starts from the beginning and creates features of the query's layers
-// only. Without one, it keeps the features of all other layers until they are read, and fails when they are
-// many. With its own dataset-wide reading, ogr2ogr would take a failure for the end.
+// While a query is open, the source starts from the beginning and creates features of the query's
+// layers only. Without one, it keeps the features of all other layers until they are read, and
+// fails when they are many. With its own dataset-wide reading, ogr2ogr would take a failure for the
+// end.
 bool MeshmarkDataset::GiveTurn(MeshmarkLayer &layer, bool starts)
 {
     if (!m_readsInTurn || m_turnOf == &layer)

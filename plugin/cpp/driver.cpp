@@ -14,7 +14,8 @@ static void ReportException(const char *reason)
     CPLError(CE_Failure, CPLE_AppDefined, "MESHMARK failed inside: %s", reason);
 }
 
-// GDALIdentifyDriver gives no flags, or those of every kind of data (GDAL 3.12); opening gives others.
+// GDALIdentifyDriver gives no flags, or those of every kind of data (GDAL 3.12); opening gives
+// others.
 static bool IsAskedForTheDriver(const GDALOpenInfo *info)
 {
     return info->nOpenFlags == 0 || info->nOpenFlags == (GDAL_OF_KIND_MASK & ~GDAL_OF_MULTIDIM_RASTER);
@@ -22,7 +23,8 @@ static bool IsAskedForTheDriver(const GDALOpenInfo *info)
 
 // GDAL's writers delete a file of the output's name before they make their own, by the driver that
 // identifies it. While a map is being read through MESHMARK, that driver is this one, and Delete
-// below refuses. So does Open for an update, which GDAL 3.12 asks only of drivers that may know the file.
+// below refuses. So does Open for an update, which GDAL 3.12 calls only for drivers that may
+// recognise the file.
 static int Identify(GDALOpenInfo *info)
 {
     if (HasPrefix(info->pszFilename))
@@ -86,8 +88,8 @@ static GDALDataset *Create(const char *name, int, int, int bands, GDALDataType, 
     }
 }
 
-// GDAL deletes the file of a dataset's name before it creates the dataset, and continues when that fails.
-// Create decides what is in the way of a marked map, so this function reports nothing.
+// GDAL deletes the file of a dataset's name before it creates the dataset, and continues when that
+// fails. Create decides what is in the way of a marked map, so this function reports nothing.
 static CPLErr Delete(const char *name)
 {
     if (!HasPrefix(name))

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <limits>
 
-// The interval between checks of the source's files, so that a change is detected before a writer commits.
+// The interval between checks of the source's files, so that a change is detected before a writer
+// commits.
 constexpr int FEATURES_BETWEEN_CHECKS = 256;
 // The metadata domain in which GDAL keeps members of a GeoJSON file.
 constexpr const char *NATIVE_DATA = "NATIVE_DATA";
@@ -23,7 +24,7 @@ GDALDataset *MeshmarkLayer::GetDataset()
     return &m_dataset;
 }
 
-// --- metadata: the source's, but for the unmarked extent that a GeoJSON file has in its words -----------------
+// --- metadata: the source's, but for the unmarked extent that a GeoJSON file has in its words ----
 
 static bool IsNativeData(const char *domain)
 {
@@ -67,7 +68,8 @@ OGRFeature *MeshmarkLayer::GetNextFeature()
     return nullptr;
 }
 
-// Returns the next feature of the source, marked. After a failure there is none until the next reset.
+// Returns the next feature of the source, marked. After a failure there is none until the next
+// reset.
 OGRFeatureUniquePtr MeshmarkLayer::ReadNext()
 {
     if (m_ended)
@@ -214,7 +216,8 @@ static void SetFilter(OGRLayer &source, int field, OGRGeometry *geometry)
 }
 
 // A straight edge moves no further than its ends do, so a source's rectangle that is wider by the
-// furthest move loses no feature; PassesFilters then decides. Arcs may move further than their points.
+// furthest move loses no feature; PassesFilters then decides. Arcs may move further than their
+// points.
 void MeshmarkLayer::ApplySpatialFilterToSource()
 {
     ApplyIgnoredFieldsToSource();
@@ -267,7 +270,8 @@ bool MeshmarkLayer::HasStraightEdges(int field) const
 }
 
 // The source evaluates the filter, in its own language and with its own indices, unless the filter
-// asks for geometry (OGR_GEOM_AREA, OGR_GEOMETRY): that one must be OGR SQL, which we can evaluate.
+// depends on geometry (OGR_GEOM_AREA, OGR_GEOMETRY): such a filter must be OGR SQL, which this
+// class can evaluate.
 OGRErr MeshmarkLayer::SetAttributeFilter(const char *query)
 {
     CPLPushErrorHandler(CPLQuietErrorHandler);
@@ -278,8 +282,8 @@ OGRErr MeshmarkLayer::SetAttributeFilter(const char *query)
 
     const bool refused = m_marked && !is_ogr_sql && NamesGeometry(query);
     if (refused)
-        CPLError(CE_Failure, CPLE_NotSupported, "the filter %s asks for geometry: write it in OGR SQL, so that it sees "
-                 "the marked one", query);
+        CPLError(CE_Failure, CPLE_NotSupported, "the filter %s depends on geometry: write it in OGR SQL, so that it "
+                 "applies to the marked geometry", query);
     const bool hand_on = !m_evaluatesGeometry && !refused;
     const OGRErr error = m_source.SetAttributeFilter(hand_on ? query : nullptr);
     if (refused || error != OGRERR_NONE)

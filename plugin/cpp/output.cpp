@@ -1,4 +1,5 @@
-// A dataset under construction: layers and fields are those of the real driver, and features go to Rust.
+// A dataset under construction: layers and fields are those of the real driver, and features go to
+// Rust.
 
 #include "shim.h"
 
@@ -11,7 +12,8 @@ static OGRErr AsError(bool success)
 
 // --- dataset -------------------------------------------------------------------------------------
 
-// Returns the driver of the format, which ogr2ogr asks for field types and layer creation options.
+// Returns the driver of the format, from which ogr2ogr takes field types and layer creation
+// options.
 MeshmarkOutputDataset::MeshmarkOutputDataset(GDALDataset *schema, MeshmarkWriter *writer)
     : m_schema(schema), m_writer(writer)
 {
@@ -19,7 +21,8 @@ MeshmarkOutputDataset::MeshmarkOutputDataset(GDALDataset *schema, MeshmarkWriter
     eAccess = GA_Update;
 }
 
-// Before GDAL 3.7 nothing else is called at the end. A host learns from the last message whether it went well.
+// Before GDAL 3.7 nothing else is called at the end. A host learns from the last message whether it
+// went well.
 MeshmarkOutputDataset::~MeshmarkOutputDataset()
 {
     Finish();
@@ -68,7 +71,8 @@ MESHMARK_CONST OGRLayer *MeshmarkOutputDataset::GetLayer(int index) MESHMARK_CON
 
 int MeshmarkOutputDataset::TestCapability(const char *capability) MESHMARK_CONST
 {
-    // A layer that cannot be created must be reported: ogr2ogr -skipfailures continues without a check.
+    // A layer that cannot be created must be reported: ogr2ogr -skipfailures continues without a
+    // check.
     for (const char *ours : {ODsCCreateLayer, ODsCTransactions, ODsCRandomLayerWrite})
     {
         if (EQUAL(capability, ours))

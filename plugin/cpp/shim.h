@@ -1,7 +1,7 @@
 // The driver's classes, and the border between C++ and Rust.
 //
-// GDAL's C API cannot make a driver, so a dataset and a layer are subclassed here. They pass every call to
-// the source; Rust answers what concerns the mark.
+// GDAL's C API cannot make a driver, so a dataset and a layer are subclassed here. They pass every
+// call to the source; Rust answers what concerns the mark.
 
 #pragma once
 
@@ -11,8 +11,8 @@
 #include <memory>
 #include <vector>
 
-// GDAL 3.13 made lists of texts const, 3.12 the getters, 3.11 merged the overloads of extents and spatial filters
-// (RFC 107), 3.9 changed a parameter of SetIgnoredFields.
+// GDAL 3.13 made lists of texts const, 3.12 the getters, 3.11 merged the overloads of extents and
+// spatial filters (RFC 107), 3.9 changed a parameter of SetIgnoredFields.
 #define MESHMARK_GDAL_AT_LEAST(minor) (GDAL_VERSION_NUM >= GDAL_COMPUTE_VERSION(3, minor, 0))
 #if MESHMARK_GDAL_AT_LEAST(12)
 #define MESHMARK_CONST const
@@ -34,8 +34,8 @@ constexpr const char *MESHMARK_DRIVER = "MESHMARK";
 // PREFIX of dataset/src/marked_view.rs is the same for Rust.
 constexpr const char *MESHMARK_PREFIX = "MESHMARK:";
 
-// --- from C++ to Rust (src/ffi.rs) --------------------------------------------------------------- No
-// function throws or unwinds. Those that can fail report it with exactly one CPLError.
+// --- from C++ to Rust (src/ffi.rs) ---------------------------------------------------------------
+// No function throws or unwinds. Those that can fail report it with exactly one CPLError.
 
 struct MeshmarkMarking; // the Rust side of one marked dataset
 
@@ -53,14 +53,16 @@ extern "C"
     int64_t meshmark_move(const MeshmarkMarking *, const char *layer, GIntBig fid, unsigned char *wkb, size_t size);
     // Returns the furthest movement of any vertex along x and y, CRS units.
     void meshmark_reach(const MeshmarkMarking *, double *x, double *y);
-    // Returns false and reports a failure when the source's files are no longer those that were marked.
+    // Returns false and reports a failure when the source's files are no longer those that were
+    // marked.
     bool meshmark_source_is_unchanged(const MeshmarkMarking *);
 
-    // Returns false and reports a failure when layer number `number` has not yielded as many features as were
-    // marked.
+    // Returns false and reports a failure when layer number `number` has not yielded as many
+    // features as were marked.
     bool meshmark_is_complete(const MeshmarkMarking *, const char *layer, int number, uint64_t features);
 
-    // Leaves places out of the native data of a feature; whether its foreign members hold some (src/ffi_native_data.rs).
+    // Removes places from the native data of a feature; returns whether its foreign members hold
+    // some (src/ffi_native_data.rs).
     bool meshmark_clear_native_data(OGRFeatureH);
     void meshmark_warn_of_foreign_places(const char *layer);
     // The native data of a layer, without places; the caller frees it.
@@ -68,21 +70,22 @@ extern "C"
 
     // Returns whether writing to `name` would destroy the source of an open marked dataset.
     bool meshmark_is_being_read(const char *name);
-    // Reports that it is being read, and first saves a copy if a writer may overwrite it all the same.
+    // Reports that it is being read, and first saves a copy if a writer may overwrite it all the
+    // same.
     void meshmark_refuse_to_write(const char *name, bool copy_first);
     // Return the XML lists of open and creation options, which live as long as the process.
     const char *meshmark_option_list();
     const char *meshmark_creation_option_list();
 }
 
-// --- from C++ to Rust, while a host writes (src/ffi_writer.rs) -------------------------------------
+// --- from C++ to Rust, while a host writes (src/ffi_writer.rs) -----------------------------------
 
 struct MeshmarkWriter; // the Rust side of a dataset under construction
 
 extern "C"
 {
-    // Begins the file `name`; nullptr on failure. *schema is an empty dataset of the real driver that lives as
-    // long as the writer.
+    // Begins the file `name`; nullptr on failure. *schema is an empty dataset of the real driver
+    // that lives as long as the writer.
     MeshmarkWriter *meshmark_writer_new(const char *name, CSLConstList options, GDALDatasetH *schema);
     // Creates a layer and returns the empty one of the real driver, nullptr on failure.
     OGRLayerH meshmark_writer_add_layer(MeshmarkWriter *, const char *name, OGRSpatialReferenceH,
@@ -94,8 +97,8 @@ extern "C"
     // Returns false when no transaction is open.
     bool meshmark_writer_commit(MeshmarkWriter *);
     void meshmark_writer_roll_back(MeshmarkWriter *);
-    // Marks and publishes unless the host failed with `host_failure`; frees the writer. Metadata and styles
-    // are those of `described`.
+    // Marks and publishes unless the host failed with `host_failure`; frees the writer. Metadata
+    // and styles are those of `described`.
     bool meshmark_writer_finish(MeshmarkWriter *, GDALDatasetH described, const char *host_failure);
 
     // Reports why a marked map is not opened for update.
@@ -203,11 +206,11 @@ class MeshmarkDataset final : public GDALDataset
     bool IsLayerPrivate(int index) const override { return m_source && m_source->IsLayerPrivate(index); }
     int TestCapability(const char *capability) MESHMARK_CONST override;
 
-    // Whether the source creates features of all layers in one pass over its file, so that only one layer can
-    // be read at a time.
+    // Whether the source creates features of all layers in one pass over its file, so that only one
+    // layer can be read at a time.
     bool ReadsInTurn() const { return m_readsInTurn; }
-    // Makes a layer readable from its start, or further; returns false and reports a failure when another one
-    // has been begun since.
+    // Makes a layer readable from its start, or further; returns false and reports a failure when
+    // another one has been begun since.
     bool GiveTurn(MeshmarkLayer &layer, bool starts);
     void EndTurn();
     void EndTurnOf(const MeshmarkLayer &layer);
@@ -234,8 +237,8 @@ class MeshmarkDataset final : public GDALDataset
     std::vector<std::unique_ptr<MeshmarkLayer>> m_layers;
 };
 
-// --- the write side ------------------------------------------------------------------------------ Hosts see
-// the layers and fields of the real driver; features go to Rust.
+// --- the write side ------------------------------------------------------------------------------
+// Hosts see the layers and fields of the real driver; features go to Rust.
 
 class MeshmarkOutputDataset;
 
@@ -297,8 +300,8 @@ class MeshmarkOutputDataset final : public GDALDataset
 #elif MESHMARK_GDAL_AT_LEAST(7)
     CPLErr Close() override;
 #endif
-    // Returns the writer for a call that writes. GDAL's last failure afterwards is a later one, which Finish
-    // examines.
+    // Returns the writer for a call that writes. GDAL's last failure afterwards is a later one,
+    // which Finish examines.
     MeshmarkWriter *Writer();
 
   protected:

@@ -1,15 +1,15 @@
 /*
  * meshmark.h: watermarking for programs that hold a GDAL dataset.
  *
- * Most programs need nothing of this: they open "MESHMARK:<dataset>" with open options and get the
- * marked map. This header is for those that hold a dataset which has no name to open it by: one in
- * memory, a query's result, one opened with options of its own.
+ * Most programs do not need this header: they open "MESHMARK:<dataset>" with open options and read
+ * the marked map. It is for programs that hold a dataset without a name by which it can be opened:
+ * a dataset in memory, the result of a query, or one opened with options of its own.
  *
  *     CPLStringList options;
  *     options.SetNameValue("KEY", "key.json");
  *     options.SetNameValue("RECIPIENT", "ACME GmbH");
  *     GDALDatasetH marked = MeshmarkFilter(source, options.List());
- *     if (!marked) { ... CPLGetLastErrorMsg() says why ... }
+ *     if (!marked) { ... CPLGetLastErrorMsg() is the reason ... }
  *     ... read `marked` by any call of GDAL ...
  *     GDALClose(marked);
  *     GDALClose(source);
@@ -31,12 +31,12 @@ CPL_C_START
 
 /*
  * Returns a read-only dataset whose layers are those of `source` with marked geometry. The options
- * are the driver's open options (KEY, RECIPIENT or MESSAGE, AMPLITUDE, ...; `ogrinfo --format
- * MESHMARK` lists them). All vertices are read once and their new places computed before it returns;
- * features then stream.
+ * are the driver's open options (KEY, RECIPIENT or MESSAGE, AMPLITUDE, ...;
+ * `ogrinfo --format MESHMARK` lists them). All vertices are read once and their new places computed
+ * before it returns; features then stream.
  *
- * On failure it returns NULL after exactly one CPLError, whose sentence names what is wrong and what
- * to do. It never changes `source`'s data.
+ * On failure it returns NULL after exactly one CPLError, whose sentence names what is wrong and
+ * what to do. It never changes `source`'s data.
  *
  * Filters and ignored fields that are set on the layers of `source` are cleared: the whole map is
  * marked. While the result is open, read the layers through it alone: both share the one position

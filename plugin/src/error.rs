@@ -65,7 +65,7 @@ pub enum Error {
     NoSubject,
     #[error("RECORD={path} is the same file as the {what}: give the record a file of its own")]
     RecordIsOther { path: String, what: &'static str },
-    #[error("RECORD={path} is there already and says something else: move it away, or give another name")]
+    #[error("RECORD={path} is there already and has other content: move it away, or give another name")]
     RecordDiffers { path: String },
     #[error(
         "RECORD={path} cannot be written ({reason}): give a file in a folder that exists and can be written"

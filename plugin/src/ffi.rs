@@ -1,5 +1,5 @@
-//! The border: the functions of this library that GDAL, hosts and the C++ shim call. `cpp/shim.h` and
-//! `include/meshmark.h` declare these functions.
+//! The border: the functions of this library that GDAL, hosts and the C++ shim call. `cpp/shim.h`
+//! and `include/meshmark.h` declare these functions.
 
 use crate::{
     error::{Error, Result},
@@ -45,7 +45,8 @@ pub extern "C" fn RegisterOGRMESHMARK() {
 /// See `include/meshmark.h`.
 ///
 /// # Safety
-/// `source` is null or an open dataset; `options` is null or an array of C strings that ends in null.
+/// `source` is null or an open dataset; `options` is null or an array of C strings that ends in
+/// null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn MeshmarkFilter(source: GDALDatasetH, options: OptionList) -> GDALDatasetH {
     guarded(ptr::null_mut(), || {
@@ -219,7 +220,8 @@ fn request(options: &[String]) -> Result<MarkingRequest> {
     MarkingRequest::new(&split_options(options)?, default_key_path())
 }
 
-/// Marks the dataset and suppresses the messages of GDAL meanwhile: streaming emits those that matter again.
+/// Marks the dataset and suppresses the messages of GDAL meanwhile: streaming emits those that
+/// matter again.
 pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
@@ -232,7 +234,8 @@ pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result
     let surveyed = Source { name, dataset: source, files, last_failure: &last_failure };
     let mut marking = Marking::new(request, surveyed, threads())?;
     drop(geometry_only);
-    marking.warnings.extend(coordinates_as_text(source)); // the survey is to meet what cannot be read
+    // This follows the survey, which reports unreadable input.
+    marking.warnings.extend(coordinates_as_text(source));
     Ok(marking)
 }
 

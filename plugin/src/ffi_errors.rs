@@ -1,5 +1,5 @@
-//! GDAL's errors: this library emits one per failure, collects those of the functions that it calls, and
-//! turns panics into errors.
+//! GDAL's errors: this library emits one per failure, collects those of the functions that it
+//! calls, and turns panics into errors.
 
 use crate::error::{Error, Result};
 use gdal_sys::{CPLErr, CPLErrorNum, OGRErr};
@@ -26,8 +26,8 @@ fn emit(class: CPLErr::Type, number: CPLErrorNum, message: &str) {
     unsafe { gdal_sys::CPLError(class, number, c"%s".as_ptr(), message.as_ptr()) };
 }
 
-/// Runs `f`; a panic becomes one GDAL failure and `on_panic`. Every function that C++ calls runs under this
-/// guard, as unwinding into C++ would be undefined.
+/// Runs `f`; a panic becomes one GDAL failure and `on_panic`. Every function that C++ calls runs
+/// under this guard, as unwinding into C++ would be undefined.
 pub fn guarded<T>(on_panic: T, f: impl FnOnce() -> T) -> T {
     match panic::catch_unwind(AssertUnwindSafe(f)) {
         Ok(value) => value,
@@ -49,8 +49,8 @@ fn describe(payload: &(dyn Any + Send)) -> &str {
 
 static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
 
-/// Keeps panics off the standard error of the host; [`guarded`] reports them. This library links a standard
-/// library of its own, so the hook affects no other code.
+/// Keeps panics off the standard error of the host; [`guarded`] reports them. This library links a
+/// standard library of its own, so the hook affects no other code.
 pub fn silence_panics() {
     panic::set_hook(Box::new(|info| {
         let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line()));
@@ -62,8 +62,8 @@ fn take_panic_place() -> String {
     PANIC_PLACE.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
 }
 
-/// Collects the errors of the GDAL functions that are called while it lives, on its own thread, which it
-/// cannot leave.
+/// Collects the errors of the GDAL functions that are called while it lives, on its own thread,
+/// which it cannot leave.
 pub struct Collector(Box<RefCell<Vec<Caught>>>, PhantomData<*const ()>);
 
 struct Caught {

@@ -70,7 +70,8 @@ impl FeatureRef<'_> {
 
     /// Returns the bytes of a field's text, in any encoding.
     pub fn bytes(&self, field: usize) -> Vec<u8> {
-        // SAFETY: the feature is there, GDAL checks the index, and the value is a C string that is copied.
+        // SAFETY: the feature is there, GDAL checks the index, and the value is a C string that is
+        // copied.
         unsafe {
             CStr::from_ptr(gdal_sys::OGR_F_GetFieldAsString(self.0, field as c_int)).to_bytes().to_vec()
         }
@@ -117,8 +118,8 @@ impl Feature {
         FeatureRef(self.0, PhantomData)
     }
 
-    /// Copies geometry and attributes of another feature. `map` holds for each field of the other feature the
-    /// number of the field here, or none; fields in `lists` become JSON.
+    /// Copies geometry and attributes of another feature. `map` holds for each field of the other
+    /// feature the number of the field here, or none; fields in `lists` become JSON.
     pub fn copy_from(&self, other: FeatureRef, map: &[Option<usize>], lists: &[usize]) -> Result<()> {
         if map.len() != other.field_count() {
             let reason = format!("it has {} fields, its layer {}", other.field_count(), map.len());

@@ -1,5 +1,5 @@
-//! GDAL's native data, the members of a GeoJSON file beyond GDAL's own model: they are passed on without
-//! unmarked positions.
+//! GDAL's native data, the members of a GeoJSON file beyond GDAL's own model: they are passed on
+//! without unmarked positions.
 
 use crate::{
     ffi_errors::{guarded, report},
@@ -16,12 +16,12 @@ use std::{
     ptr,
 };
 
-/// The metadata domain of a layer, and the name of the item and of the layer creation option that hold native
-/// data.
+/// The metadata domain of a layer, and the name of the item and of the layer creation option that
+/// hold native data.
 pub const NATIVE_DATA: &str = "NATIVE_DATA";
 
-/// Returns the value of a NAME=VALUE pair of a layer's native data without positions; `None` when nothing is
-/// left.
+/// Returns the value of a NAME=VALUE pair of a layer's native data without positions; `None` when
+/// nothing is left.
 pub fn item_without_places(name: &str, value: &str) -> Option<String> {
     if !name.eq_ignore_ascii_case(NATIVE_DATA) {
         return Some(value.into());
@@ -30,7 +30,8 @@ pub fn item_without_places(name: &str, value: &str) -> Option<String> {
 }
 
 impl FeatureRef<'_> {
-    /// Its native data without places, and whether its foreign members hold some; none when there is nothing left.
+    /// Returns its native data without places, and whether its foreign members hold some; `None`
+    /// when nothing is left.
     pub fn native_data(&self) -> Option<(CString, bool)> {
         // SAFETY: the feature is there; both texts are null or C strings, and are copied.
         let (data, foreign) = unsafe {
@@ -59,7 +60,8 @@ impl Feature {
     }
 }
 
-/// Leaves places out of the native data of a feature that is handed on; whether its foreign members hold some.
+/// Removes places from the native data of a feature that is handed on; returns whether its foreign
+/// members hold some.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) -> bool {
     guarded(false, || {
@@ -79,7 +81,8 @@ unsafe extern "C" fn meshmark_warn_of_foreign_places(layer: *const c_char) {
     guarded((), || report(CPLErr::CE_Warning, foreign_places(&unsafe { text(layer) })));
 }
 
-/// Returns the native data of a layer, as a list of metadata, without positions; the caller frees it.
+/// Returns the native data of a layer, as a list of metadata, without positions; the caller frees
+/// it.
 ///
 /// # Safety
 /// `metadata` is null or an array of C strings that ends in null.

@@ -1,4 +1,5 @@
-//! Datasets that are written by GDAL's C API: layers, fields, features, and their metadata and styles.
+//! Datasets that are written by GDAL's C API: layers, fields, features, and their metadata and
+//! styles.
 
 use crate::{
     error::Result,
@@ -59,7 +60,8 @@ impl LayerSpec {
         if self.srs.0.is_null() {
             return true;
         }
-        // SAFETY: ours is a reference, the others are made and released here; null is no name, and the list ends in it.
+        // SAFETY: ours is a reference, the others are made and released here; null is no name, and
+        // the list ends in it.
         unsafe {
             let own = Srs(gdal_sys::OSRClone(self.srs.0));
             gdal_sys::OSRDemoteTo2D(own.0, ptr::null());
@@ -148,8 +150,8 @@ impl Field {
         }
     }
 
-    /// Returns the field of a staging GeoPackage that keeps every value of this one: types that GeoPackage
-    /// would change become text. The target checks constraints.
+    /// Returns the field of a staging GeoPackage that keeps every value of this one: types that
+    /// GeoPackage would change become text. The target checks constraints.
     pub fn staged(&self, name: String, is_geopackage: bool) -> Self {
         let kept = match self.kind {
             OGRFieldType::OFTInteger
@@ -284,8 +286,9 @@ impl Output {
         let mut list: Vec<*mut c_char> = options.iter().map(|o| o.as_ptr().cast_mut()).collect();
         list.push(ptr::null_mut());
         let collector = Collector::new();
-        // SAFETY: the dataset is open, the list ends in null, and GDAL changes no option; the configuration option
-        // is restored. GDAL has checked the options already when the host created the layer.
+        // SAFETY: the dataset is open, the list ends in null, and GDAL changes no option; the
+        // configuration option is restored. GDAL has checked the options already when the host
+        // created the layer.
         let layer = unsafe {
             let before = gdal_sys::CPLGetThreadLocalConfigOption(VALIDATE.as_ptr(), ptr::null());
             let before = (!before.is_null()).then(|| CStr::from_ptr(before).to_owned());
@@ -313,7 +316,8 @@ impl Output {
 
     /// Returns the fields of a layer.
     pub fn fields(&self, layer: usize) -> Vec<Field> {
-        // SAFETY: the definition lives as long as the layer, and the indices are those of its fields.
+        // SAFETY: the definition lives as long as the layer, and the indices are those of its
+        // fields.
         unsafe {
             let definition = gdal_sys::OGR_L_GetLayerDefn(self.layers[layer]);
             let count = gdal_sys::OGR_FD_GetFieldCount(definition);
@@ -327,7 +331,8 @@ impl Output {
         unsafe { gdal_sys::OGR_FD_GetFieldCount(gdal_sys::OGR_L_GetLayerDefn(self.layers[layer])) as usize }
     }
 
-    /// Returns the name of a layer and of its columns for ids and geometries; empty where there is none.
+    /// Returns the name of a layer and of its columns for ids and geometries; empty where there is
+    /// none.
     pub fn names(&self, layer: usize) -> [String; 3] {
         // SAFETY: the layer is open and the names are C strings.
         unsafe {

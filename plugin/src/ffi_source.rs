@@ -31,8 +31,8 @@ const DRIVER: &CStr = c"MESHMARK";
 pub struct OwnedSource(GDALDatasetH);
 
 impl OwnedSource {
-    /// Opens a vector dataset to read, with the native data of a GeoJSON file if `with_native_data`. Messages
-    /// of GDAL are emitted only when it succeeds.
+    /// Opens a vector dataset to read, with the native data of a GeoJSON file if
+    /// `with_native_data`. Messages of GDAL are emitted only when it succeeds.
     pub fn open(name: &str, with_native_data: bool) -> Result<Self> {
         if name.trim().is_empty() {
             return Err(Error::NoSource);
@@ -42,8 +42,8 @@ impl OwnedSource {
         }
         let c_name = CString::new(name).expect("it was a C string");
         let collector = Collector::new();
-        // Internal means that the handle belongs to this library alone and is not listed among the host's
-        // datasets.
+        // Internal means that the handle belongs to this library alone and is not listed among the
+        // host's datasets.
         let flags = GdalOpenFlags::GDAL_OF_VECTOR
             | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR
             | GdalOpenFlags::GDAL_OF_INTERNAL;
@@ -51,7 +51,8 @@ impl OwnedSource {
         let options = OPEN_OPTIONS.into_iter().chain(native);
         let options: Vec<CString> = options.map(|o| CString::new(o).expect("it has no NUL")).collect();
         let options: Vec<_> = options.iter().map(|option| option.as_ptr()).chain([ptr::null()]).collect();
-        // SAFETY: the name is a C string; null lists mean all drivers and no sibling files, the options end in null.
+        // SAFETY: the name is a C string; null lists mean all drivers and no sibling files, the
+        // options end in null.
         let handle = unsafe {
             gdal_sys::GDALOpenEx(c_name.as_ptr(), flags.bits(), ptr::null(), options.as_ptr(), ptr::null())
         };
@@ -74,7 +75,8 @@ impl OwnedSource {
 
     /// Returns the dataset, which lives as long as this.
     pub fn dataset(&self) -> Borrowed<'_> {
-        // SAFETY: the handle is open, and the borrow of `self` keeps its reference from being given up.
+        // SAFETY: the handle is open, and the borrow of `self` keeps its reference from being given
+        // up.
         unsafe { Borrowed::new(self.0) }
     }
 }
@@ -119,7 +121,8 @@ impl View {
     pub fn for_each(&self, layer: &str, mut f: impl FnMut(Feature) -> Result<()>) -> Result<()> {
         let name = CString::new(layer).expect("it was a C string");
         let collector = Collector::new();
-        // SAFETY: the dataset is open, the name is a C string, and features are the caller's to destroy.
+        // SAFETY: the dataset is open, the name is a C string, and features are the caller's to
+        // destroy.
         unsafe {
             let layer = gdal_sys::GDALDatasetGetLayerByName(self.handle, name.as_ptr());
             if !layer.is_null() {
@@ -158,13 +161,14 @@ fn is_raster(name: &CStr) -> bool {
     known(GdalOpenFlags::GDAL_OF_RASTER) && !known(GdalOpenFlags::GDAL_OF_VECTOR)
 }
 
-/// A dataset that this library does not own, open for `'a`, in the type of the `gdal` crate: dropping it does
-/// not close it.
+/// A dataset that this library does not own, open for `'a`, in the type of the `gdal` crate:
+/// dropping it does not close it.
 pub struct Borrowed<'a>(ManuallyDrop<Dataset>, PhantomData<&'a Dataset>);
 
 impl Borrowed<'_> {
     /// # Safety
-    /// `handle` is an open dataset and stays so for the lifetime of the result, which the caller chooses.
+    /// `handle` is an open dataset and stays so for the lifetime of the result, which the caller
+    /// chooses.
     pub unsafe fn new(handle: GDALDatasetH) -> Self {
         // SAFETY: the handle is open; ManuallyDrop keeps the wrapper from closing it.
         Borrowed(ManuallyDrop::new(unsafe { Dataset::from_c_dataset(handle) }), PhantomData)

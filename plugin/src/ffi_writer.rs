@@ -1,5 +1,5 @@
-//! The border of the write side: the functions that the C++ shim calls while a host writes. `cpp/shim.h`
-//! declares them.
+//! The border of the write side: the functions that the C++ shim calls while a host writes.
+//! `cpp/shim.h` declares them.
 
 use crate::{
     error::{Error, Result},
@@ -28,12 +28,12 @@ use std::{
 
 type OptionList = *const *const c_char;
 
-/// The target that a host last tried to open for update: if the host then creates it, it does not intend a
-/// new file.
+/// The target that a host last tried to open for update: if the host then creates it, it does not
+/// intend a new file.
 static EXTENDED: Mutex<Option<String>> = Mutex::new(None);
 
-/// Begins a dataset and stores in `schema` the empty one of the real driver, which lives as long as the
-/// writer.
+/// Begins a dataset and stores in `schema` the empty one of the real driver, which lives as long as
+/// the writer.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_new(
     name: *const c_char,
@@ -102,7 +102,8 @@ unsafe extern "C" fn meshmark_writer_add_layer(
     options: OptionList,
 ) -> OGRLayerH {
     guarded(ptr::null_mut(), || {
-        // SAFETY: the shim gives a writer that it holds, a C string, an option list, and null or a reference.
+        // SAFETY: the shim gives a writer that it holds, a C string, an option list, and null or a
+        // reference.
         let (writer, name, options) = unsafe { (&mut *writer, text(name), strings(options)) };
         let added = split_options(&options).and_then(|options| {
             // SAFETY: as above.
@@ -163,8 +164,8 @@ unsafe extern "C" fn meshmark_writer_roll_back(writer: *mut Writer) {
     guarded((), || unsafe { (*writer).roll_back() });
 }
 
-/// Marks and publishes the dataset unless an operation failed, with metadata and styles of `described`; frees
-/// the writer.
+/// Marks and publishes the dataset unless an operation failed, with metadata and styles of
+/// `described`; frees the writer.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn meshmark_writer_finish(
     writer: *mut Writer,
@@ -172,7 +173,8 @@ unsafe extern "C" fn meshmark_writer_finish(
     host_failure: *const c_char,
 ) -> bool {
     guarded(false, || {
-        // SAFETY: the shim gives up its writer; the dataset is open during the call; null or a C string.
+        // SAFETY: the shim gives up its writer; the dataset is open during the call; null or a C
+        // string.
         let (writer, described, host_failure) = unsafe {
             let failure = (!host_failure.is_null()).then(|| text(host_failure));
             (*Box::from_raw(writer), Described::new(described), failure)

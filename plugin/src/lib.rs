@@ -8,11 +8,11 @@
 //!                             dataset::survey, core::embedding
 //! ```
 //!
-//! Writing stages the features of a host and marks them when the host closes the dataset: `writer.rs` shows
-//! the data flow.
+//! Writing stages the features of a host and marks them when the host closes the dataset:
+//! `writer.rs` shows the data flow.
 //!
-//! Opening computes the mark; only the vertex table and its new coordinates stay in memory. Features stream
-//! through the C++ layer, which passes each geometry to `marking.rs` as WKB.
+//! Opening computes the mark; only the vertex table and its new coordinates stay in memory.
+//! Features stream through the C++ layer, which passes each geometry to `marking.rs` as WKB.
 #![deny(unsafe_op_in_unsafe_fn)]
 #![warn(missing_docs)]
 

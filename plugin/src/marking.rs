@@ -64,8 +64,8 @@ impl MarkingRequest {
         Ok(MarkingRequest { options, subject, key, key_path })
     }
 
-    /// Renames the chosen layers to the names under which they are staged; layers without such a name stay
-    /// and are later reported as missing.
+    /// Renames the chosen layers to the names under which they are staged; layers without such a
+    /// name stay and are later reported as missing.
     pub fn rename_layers<'a>(&mut self, staged: impl Fn(&str) -> Option<&'a str>) {
         for name in self.options.layers.iter_mut().flatten() {
             if let Some(staged) = staged(name) {
@@ -165,14 +165,14 @@ impl Marking {
         wanted.map_or(Ok(()), |(path, text)| record_file::write(path, text))
     }
 
-    /// Fails unless the message can be demodulated from the places `found` of the vertices, which are their
-    /// new places as read back, in canonical order.
+    /// Fails unless the message can be demodulated from the places `found` of the vertices, which
+    /// are their new places as read back, in canonical order.
     ///
-    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are no erasures
-    /// for [`demodulation::joint`] to leave out, and the noise that it would weigh, the rounding to the
-    /// digits of the format, has no estimate here. [`embedding`] has an estimate of its own noise and uses
-    /// `joint`. The two checks stay different, as a change of the demodulator would change which outputs are
-    /// refused.
+    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are
+    /// no erasures for [`demodulation::joint`] to leave out, and the noise that it would weigh, the
+    /// rounding to the digits of the format, has no estimate here. [`embedding`] has an estimate of
+    /// its own noise and uses `joint`. The two checks stay different, as a change of the
+    /// demodulator would change which outputs are refused.
     pub fn check_message(
         &self,
         request: &MarkingRequest,
@@ -219,7 +219,8 @@ impl Marking {
         })
     }
 
-    /// Fails when a layer that was read to its end yielded another number of features than were marked.
+    /// Fails when a layer that was read to its end yielded another number of features than were
+    /// marked.
     pub fn check_count(&self, layer: String, number: usize, came: u64) -> Result<()> {
         match self.map.features.get(&number) {
             Some(&marked) if marked != came => Err(Error::OtherCount { layer, marked, came }),

@@ -1,9 +1,10 @@
 //! The target of ogr2ogr, read from its command line.
 //!
-//! Writers of several files, like that of Shapefiles, append to the files of a folder without asking the
-//! driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features would go into the source
-//! itself, so this is refused before anything is written. A record in the place of the output is refused too,
-//! as one would overwrite the other. Other hosts are not examined.
+//! Writers of several files, like that of Shapefiles, append to the files of a folder without
+//! a call of the driver that reads them. With `ogr2ogr folder MESHMARK:folder` the marked features
+//! would go into the source itself, so this is refused before anything is written. A record in the
+//! place of the output is refused too, as one would overwrite the other. Other hosts are not
+//! examined.
 
 use crate::{
     error::{Error, Result},
@@ -35,16 +36,16 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Returns the target of ogr2ogr, if `is_asked_for` accepts it. The target precedes the source; options and
-/// their values stand before and between them.
-fn target(arguments: &[String], is_asked_for: impl Fn(&Path) -> bool) -> Option<&str> {
+/// Returns the target of ogr2ogr, if `is_accepted` accepts it. The target precedes the source;
+/// options and their values stand before and between them.
+fn target(arguments: &[String], is_accepted: impl Fn(&Path) -> bool) -> Option<&str> {
     let (program, rest) = arguments.split_first()?;
     if Path::new(program).file_name()? != "ogr2ogr" {
         return None;
     }
     let source = rest.iter().position(marked_view::is_named_by)?;
     let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
-    let named = (0..source).find(|&at| !is_input(at) && is_asked_for(Path::new(&rest[at])))?;
+    let named = (0..source).find(|&at| !is_input(at) && is_accepted(Path::new(&rest[at])))?;
     Some(&rest[named])
 }
 

@@ -1,5 +1,5 @@
-//! Reading back: this module checks that a written file holds what was meant, and that the message can be
-//! demodulated from its vertices.
+//! Reading back: this module checks that a written file holds what was meant, and that the message
+//! can be demodulated from its vertices.
 
 use crate::{
     error::{Error, Result},
@@ -34,8 +34,8 @@ pub struct WrittenLayer {
     pub options: Vec<(String, String)>,
 }
 
-/// Fails unless the file holds the features of the marked map, within the precision of its format, and the
-/// message.
+/// Fails unless the file holds the features of the marked map, within the precision of its format,
+/// and the message.
 pub fn check(written: &Written, view: &View, request: &MarkingRequest, threads: usize) -> Result<()> {
     let file = open(written)?;
     let meant = view.dataset();

@@ -19,7 +19,8 @@ pub fn check_folder(path: &Path) -> Result<()> {
     Err(Error::RecordUnwritable { path: path.display().to_string(), reason })
 }
 
-/// Writes the record. An existing file with the same content is accepted, as hosts open a map more than once.
+/// Writes the record. An existing file with the same content is accepted, as hosts open a map more
+/// than once.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     let unwritable =
         |e: io::Error| Error::RecordUnwritable { path: path.display().to_string(), reason: e.to_string() };

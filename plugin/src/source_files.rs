@@ -1,9 +1,9 @@
 //! The files from which a marked dataset is read, which nobody may overwrite meanwhile.
 //!
-//! `ogr2ogr map.gpkg MESHMARK:map.gpkg` must not destroy the map. Before a writer of GDAL makes a file, it
-//! deletes the file of that name, and before it appends, it opens that file for update; the driver receives
-//! both calls and refuses them ([`is_being_read`]). Most writers then fail. Some truncate the file all the
-//! same: for them it is copied first ([`save_copies`]).
+//! `ogr2ogr map.gpkg MESHMARK:map.gpkg` must not destroy the map. Before a writer of GDAL makes a
+//! file, it deletes the file of that name, and before it appends, it opens that file for update;
+//! the driver receives both calls and refuses them ([`is_being_read`]). Most writers then fail.
+//! Some truncate the file all the same: for them it is copied first ([`save_copies`]).
 
 use crate::error::{Error, Result};
 use meshmark_dataset::{FileId, same_file, workplace::folder_of};
@@ -98,7 +98,8 @@ impl Drop for SourceFiles {
         let Some(at) = open.iter().position(|source| source.number == self.number) else { return };
         let copies = open.swap_remove(at).copies;
         if unchanged {
-            copies.iter().for_each(|copy| drop(fs::remove_file(copy))); // nothing was lost, they may go
+            // Nothing was lost, so the copies are removed.
+            copies.iter().for_each(|copy| drop(fs::remove_file(copy)));
         }
     }
 }
@@ -132,7 +133,8 @@ pub fn same_place(a: &Path, b: &Path) -> bool {
     same_file(a, b) || a.file_name() == b.file_name() && folder(a).is_some_and(|f| folder(b) == Some(f))
 }
 
-/// Returns whether writing to `path` would destroy the source of a marked dataset that is open in this process.
+/// Returns whether writing to `path` would destroy the source of a marked dataset that is open in
+/// this process.
 pub fn is_being_read(path: &Path) -> bool {
     let sources = open_sources();
     if sources.is_empty() {
@@ -142,8 +144,8 @@ pub fn is_being_read(path: &Path) -> bool {
     sources.iter().any(|source| source.is_written_by(id))
 }
 
-/// Copies the files of the open source that is about to be overwritten at `path`. The copies stay only if the
-/// source is overwritten.
+/// Copies the files of the open source that is about to be overwritten at `path`. The copies stay
+/// only if the source is overwritten.
 pub fn save_copies(path: &Path) -> io::Result<()> {
     let Some(id) = FileId::at(path) else { return Ok(()) };
     let mut open = open_sources();

@@ -1,8 +1,8 @@
 //! A layer in the staging GeoPackage, with the values of its features that a GeoPackage would lose.
 //!
-//! Fields are renamed where names collide, and become text where GeoPackage has no such type. The rest (unset
-//! fields, −0.0 and NaN, texts in other encodings, ids that are not ascending) is kept in a separate column,
-//! which is created when it is first needed.
+//! Fields are renamed where names collide, and become text where GeoPackage has no such type. The
+//! rest (unset fields, −0.0 and NaN, texts in other encodings, ids that are not ascending) is kept
+//! in a separate column, which is created when it is first needed.
 
 use crate::{
     error::{Error, Result},

@@ -1,4 +1,5 @@
-//! The places of the marked map, its reference and its record, which are checked before anything is written.
+//! The places of the marked map, its reference and its record, which are checked before anything is
+//! written.
 
 use crate::{
     error::{Error, Result},
@@ -7,9 +8,10 @@ use crate::{
 };
 use meshmark_core::options::Creation;
 use meshmark_dataset::{
+    file_error,
     formats::Format,
     same_file,
-    workplace::{Workplace, file_error, folder_of},
+    workplace::{Workplace, folder_of},
 };
 use std::{
     ffi::{OsStr, OsString},
@@ -43,8 +45,8 @@ pub struct Places {
 }
 
 impl Target {
-    /// Finds the places of the target and the reference. Files that occupy them now may vanish when the
-    /// workplaces are made.
+    /// Finds the places of the target and the reference. Files that occupy them now may vanish when
+    /// the workplaces are made.
     pub fn new(name: &str, creation: &Creation) -> Result<Self> {
         let format = Format::find(creation.format.as_deref(), Path::new(name))?;
         let path = place(Path::new(name))?;
@@ -82,8 +84,8 @@ impl Target {
         self.path.file_name().expect("a place has a name")
     }
 
-    /// Makes the workplaces, which removes the remains of killed processes, and checks that no file is in the
-    /// way.
+    /// Makes the workplaces, which removes the remains of killed processes, and checks that no file
+    /// is in the way.
     pub fn places(&self, request: &MarkingRequest) -> Result<Places> {
         if same_file(&self.path, request.key_path()) {
             return Err(Error::SameFile { option: "KEY", other: "the target" });
@@ -118,8 +120,8 @@ impl Target {
         Ok(Places { staged, record, main, _others: others })
     }
 
-    /// Returns the files of the replaced dataset other than its main file: those that the new one in `made`
-    /// has too, and those that readers of Shapefiles would take for parts of the new one.
+    /// Returns the files of the replaced dataset other than its main file: those that the new one
+    /// in `made` has too, and those that readers of Shapefiles would take for parts of the new one.
     pub fn side_files(&self, made: &Path) -> Result<Vec<PathBuf>> {
         if !self.path.is_file() {
             return Ok(Vec::new());

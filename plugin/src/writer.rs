@@ -1,13 +1,14 @@
-//! The write side: the features of a host are staged; when the host closes the dataset, they are marked and
-//! published.
+//! The write side: the features of a host are staged; when the host closes the dataset, they are
+//! marked and published.
 //!
 //! ```text
-//! host ──layers, fields──> schema (the real driver, an empty dataset: answers what the format can do)
+//! host ──layers, fields──> schema (an empty dataset of the real driver: the capabilities)
 //!      ──features────────> staging GeoPackage, in the end the REFERENCE
 //! close: staging ──marking──> the real driver ──read_back──> publication
 //! ```
 //!
-//! After a failure no call of a host leads to publication: a writer that failed once only cleans up.
+//! After a failure no call of a host leads to publication: a writer that failed once only cleans
+//! up.
 
 use crate::{
     error::{Error, Result},
@@ -20,9 +21,9 @@ use crate::{
     target::{Places, Target},
 };
 use meshmark_dataset::{
+    file_error,
     marking::foreign_places,
     publication::{Move, Publication},
-    workplace::file_error,
 };
 use std::{fs, path::Path};
 
@@ -87,8 +88,8 @@ impl Writer {
         })
     }
 
-    /// Creates a field. A format without such a field is reported to the host and is not a failure of the
-    /// dataset.
+    /// Creates a field. A format without such a field is reported to the host and is not a failure
+    /// of the dataset.
     pub fn add_field(&mut self, layer: usize, field: &Field, approximate: bool) -> Result<()> {
         let before = self.schema.field_count(layer);
         self.schema.add_field(layer, field, approximate, false)?;
@@ -141,8 +142,8 @@ impl Writer {
         result
     }
 
-    /// Marks, writes, reads back and publishes; `host_failure` is the failure that the host reported before
-    /// it closed the dataset. Returns warnings for the user.
+    /// Marks, writes, reads back and publishes; `host_failure` is the failure that the host
+    /// reported before it closed the dataset. Returns warnings for the user.
     pub fn finish(
         self,
         described: &Described,

@@ -16,7 +16,7 @@ ICON = os.path.join(os.path.dirname(__file__), "icon.svg")
 
 
 class Algorithm(QgsProcessingAlgorithm):
-    """A subclass defines NAME, `title`, `about`, and the programs that it `needs`."""
+    """The base class: a subclass defines NAME, `title`, `about` and the programs it `needs`."""
 
     NAME = ""
 
@@ -85,7 +85,7 @@ class Algorithm(QgsProcessingAlgorithm):
             self.needs()
         except Missing as missing:
             raise QgsProcessingException(str(missing)) from missing
-        # A model asks nobody else.
+        # A model does not call checkParameterValues.
         objection = self.objection(parameters, context)
         if objection:
             raise QgsProcessingException(objection)
@@ -115,8 +115,8 @@ class Algorithm(QgsProcessingAlgorithm):
 
 
 class Inputs:
-    """The maps of a run as files. What a layer only shows is copied: beside the report, which names it, or into a folder that
-    goes with the run."""
+    """The maps of a run as files. A Snapshot is copied beside the report, which names the copy, or,
+    without a report, into a folder that is removed after the run."""
 
     def __init__(self, report, staging):
         self._base = os.path.splitext(report)[0] + "." if report else os.path.join(staging, "")

@@ -68,7 +68,7 @@ def has_option(subcommand, option):
 
 
 def run(arguments, feedback, on_output=lambda text: None):
-    """Runs a program to its end; `on_output` receives its output. Raises Cancelled on cancellation."""
+    """Runs a program to its end; `on_output` receives its output. Raises Cancelled."""
     with _startable(arguments[0]):
         process = subprocess.Popen(
             arguments,

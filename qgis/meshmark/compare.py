@@ -1,4 +1,4 @@
-"""Compare original and marked map: the figures of `meshmark compare`."""
+"""Compare original and marked map: runs `meshmark compare` and returns its figures."""
 
 import tempfile
 
@@ -95,7 +95,7 @@ class Compare(Algorithm):
 
 
 def figures():
-    """Name, label, and place of the figure in the JSON of the command."""
+    """Returns name, label, and place of each figure in the JSON of the command."""
     return [
         ("FEATURES", tr("Features compared"), ("compared", "features")),
         ("VERTICES", tr("Vertices compared"), ("compared", "vertices")),

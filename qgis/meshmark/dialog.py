@@ -47,7 +47,8 @@ class Panel(ParametersPanel):
         """Clears the preset of the original: QGIS would preset one layer for both maps."""
         maps = [p.name() for p in self.algorithm().parameterDefinitions() if p.type() == "vector"]
         for name in maps[:1]:
-            # Python sees this QgsMapLayerComboBox as a plain one. The empty layer is the first.
+            # In Python this QgsMapLayerComboBox has the type of a plain one. The empty layer is the
+            # first.
             box = self.wrappers[name].wrappedWidget().findChild(QComboBox)
             box.setProperty("allowEmptyLayer", True)
             box.setCurrentIndex(0)

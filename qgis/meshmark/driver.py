@@ -71,7 +71,7 @@ def environment():
 
 
 def clear_away(target, creation_options):
-    """Removes the remains of a killed export to `target`, by starting a new one and cancelling it."""
+    """Removes the remains of a killed export to `target`: starts a new one and cancels it."""
     with _quiet():
         dataset = find().Create(f"MESHMARK:{target}", 0, 0, 0, gdal.GDT_Unknown, creation_options)
         del dataset

@@ -1,4 +1,4 @@
-"""Export with watermark: layers in, a marked file, its record and its reference out."""
+"""Export with watermark: turns layers into a marked file, its record and its reference."""
 
 import os
 import re
@@ -52,7 +52,7 @@ class Export(Algorithm):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
         self.add(
             QgsProcessingParameterMultipleLayers("LAYERS", tr("Layers to export"), vector),
-            tr("What they show is exported, with their filters and unsaved edits. Several layers need a GeoPackage."),
+            tr("The displayed content is exported: filters and unsaved edits apply. Several layers need a GeoPackage."),
         )
         self._options = self._driver_options()
         options = {option.name: parameters.parameter(option) for option in self._options}
@@ -151,7 +151,7 @@ class Export(Algorithm):
 
 
 def is_kept(path, context):
-    """Returns whether a path is given outside the temporary folder, which QGIS clears when it ends."""
+    """Returns whether a path is outside the temporary folder, which QGIS clears at its end."""
     folders = [QgsProcessingUtils.tempFolder()]
     # Later versions of QGIS have one for each context, too.
     if hasattr(context, "temporaryFolder") and context.temporaryFolder():
@@ -214,7 +214,7 @@ def check_is_no_source(output, snapshots):
 
 
 def free_names(folder, stem):
-    """Returns unused names for record and reference, as those of an earlier copy are never replaced."""
+    """Returns unused names for record and reference: existing ones are never replaced."""
     number = 1
     while True:
         base = os.path.join(folder, stem if number == 1 else f"{stem}-{number}")

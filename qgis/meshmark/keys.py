@@ -12,11 +12,11 @@ from .text import tr
 
 
 class Refused(Exception):
-    """The command made no key; the message is its own."""
+    """The command made no key; the text is its message."""
 
 
 def make(path):
-    """Makes a key in a new file that only its owner can read; raises Refused when the file exists."""
+    """Makes a key in a new file that only its owner can read; raises Refused if it exists."""
     finished = commands.run([commands.meshmark(), "keygen", "--", path], QgsFeedback())
     if finished.code != 0:
         errors, _ = sentences(finished.errors)
@@ -49,7 +49,7 @@ def ask_and_make(parent):
         parent,
         tr("New key"),
         tr(
-            "The key is in {}. Keep it secret: whoever has it can read and forge marks. Keep a copy of it safe: without"
+            "The key is in {}. Keep it secret: anyone who has it can read and forge marks. Keep a copy of it safe: without"
             " it no mark can be verified."
         ).format(path),
     )

@@ -19,13 +19,16 @@ WRITERS = QgsVectorFileWriter
 
 
 class Snapshot:
-    """The content of a layer with its filter and unsaved edits: created in the main thread, read in any."""
+    """The content of a layer with its filter and unsaved edits.
+
+    It is created in the main thread and read in any.
+    """
 
     def __init__(self, layer):
         if not isinstance(layer, QgsVectorLayer):
             raise QgsProcessingException(tr("{} is no vector layer: leave it out.").format(layer.name()))
         if not layer.isValid():
-            # It would be taken for an empty one.
+            # Its copy would be empty.
             raise QgsProcessingException(tr("The layer {} cannot be read: repair its source.").format(layer.name()))
         self.name = own_name(layer)
         self.file = path_of(layer)
@@ -54,7 +57,7 @@ def path_of(layer):
 
 
 def file_of(layer):
-    """Returns the file that a layer shows unchanged; None with a filter or unsaved edits, or when not local."""
+    """Returns the local file that a layer displays unchanged, None if it is filtered or edited."""
     if layer.providerType() != "ogr" or layer.subsetString() or layer.isModified():
         return None
     return path_of(layer)

@@ -10,11 +10,11 @@ from .text import tr
 
 
 def rows():
-    """Setting, label, what is chosen, what holds while it is empty, and what it is for."""
+    """Returns setting, label, kind of path, placeholder and purpose of each row."""
     file, folder = QgsFileWidget.StorageMode.GetFile, QgsFileWidget.StorageMode.GetDirectory
     default = tr("The default of the dialogs.")
     return [
-        (settings.COMMAND, tr("Command"), file, tr("the one on the path"), tr("The program meshmark.")),
+        (settings.COMMAND, tr("Command"), file, tr("found on the path"), tr("The path of the program meshmark.")),
         (
             settings.DRIVER_FOLDER,
             tr("Driver folder"),
@@ -57,7 +57,7 @@ class OptionsPage(QgsOptionsPageWidget):
 
 
 class OptionsFactory(QgsOptionsWidgetFactory):
-    """`changed` is called when settings were saved."""
+    """Creates the page, which calls `changed` after it has saved the settings."""
 
     def __init__(self, changed):
         super().__init__("meshmark", QIcon(ICON))

@@ -1,4 +1,5 @@
-"""The driver's options as parameters of an algorithm: types, bounds, defaults and help are those of its list."""
+"""The driver's options as parameters of an algorithm, with the types, bounds, defaults and help of
+its list."""
 
 from qgis.core import (
     QgsProcessingParameterBoolean,
@@ -12,12 +13,12 @@ from .text import tr
 
 NUMBER = QgsProcessingParameterNumber.Type
 SWITCH = ["NO", "YES"]
-# Of numbers that may be in degrees; those with a default are metres.
+# Decimals of numbers that may be in degrees; those with a default are metres.
 DECIMALS = 9
 
 
 def labels():
-    """Returns the names of options in the dialog; an option of a later driver keeps its own name."""
+    """Returns the labels of options; an option of a later driver keeps its own name."""
     return {
         "RECIPIENT": tr("Recipient"),
         "MESSAGE": tr("Message, hexadecimal"),

@@ -9,14 +9,14 @@ from .text import tr
 
 
 class Proof:
-    """Taken before a copy is made, at places of a record and a reference that are free."""
+    """The state before a copy is made; the places of its record and reference are free."""
 
     def __init__(self, output, record, reference):
         self._output, self._record, self._reference = output, record, reference
         self._before = identity(output)
 
     def check(self, recipient, message):
-        """Raises unless the file is new and has a reference and a record of this recipient or message."""
+        """Raises unless the file is new, with a reference and a record of this subject."""
         found = self._found()
         expected = ("recipient", recipient) if recipient else ("message", message.lower())
         is_new = identity(self._output) not in (None, self._before)

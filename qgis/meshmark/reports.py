@@ -1,4 +1,4 @@
-"""The report that the command writes, for the algorithms that run it: its parameters, and how it is opened."""
+"""The report that the command writes: its parameters, and its display after the run."""
 
 import os
 

@@ -13,36 +13,33 @@ from qgis.PyQt.QtGui import QColor
 
 from .text import tr
 
-# The average arrow on the screen, metres.
+# Length of an arrow of typical displacement on the screen, metres.
 ARROW_M = 0.003
 
 
 def displacements(layer):
-    """Draws arrows, enlarged to a legible length at any scale; colours show the weight."""
+    """Returns a renderer of arrows, legible at any scale; colours show the weight."""
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
     exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
     return rules(
         [
-            (tr("fits in with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
-            (
-                tr("fits in less well"),
-                '"weight" >= 0.5 AND "weight" < 0.9',
-                arrow("#e69f00", exaggeration),
-            ),
-            (tr("does not fit in"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
+            (tr("agrees with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
+            (tr("agrees less"), '"weight" >= 0.5 AND "weight" < 0.9', arrow("#e69f00", exaggeration)),
+            (tr("does not agree"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
         ]
     )
 
 
 def patches(_layer):
-    """Colours scores, which are standard normal under a wrong key: above 4 once in 30 000 patches."""
+    """Returns a renderer that colours patches by score, which is standard normal under a wrong key:
+    one patch of 30 000 exceeds 4."""
     return rules(
         [
-            (tr("mark shows clearly (6 and more)"), '"score" >= 6', area("#0072b2", 110)),
-            (tr("mark shows (3 to 6)"), '"score" >= 3 AND "score" < 6', area("#56b4e9", 90)),
-            (tr("too little to say (below 3)"), '"score" < 3', area("#f0e442", 60)),
-            (tr("not found, or not tested"), '"score" IS NULL', area("#999999", 30)),
+            (tr("clear evidence (6 and more)"), '"score" >= 6', area("#0072b2", 110)),
+            (tr("evidence (3 to 6)"), '"score" >= 3 AND "score" < 6', area("#56b4e9", 90)),
+            (tr("too little evidence (below 3)"), '"score" < 3', area("#f0e442", 60)),
+            (tr("not found or not tested"), '"score" IS NULL', area("#999999", 30)),
         ]
     )
 
@@ -91,7 +88,7 @@ def file_of(layer):
 
 
 def show_above(layer):
-    """Moves a layer above those of the same file, as its place in QGIS depends on version and selection."""
+    """Moves a layer above those of the same file, as QGIS places it by version and selection."""
     node = layer.project().layerTreeRoot().findLayer(layer.id()) if layer.project() else None
     if node is None:
         return

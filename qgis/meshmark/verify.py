@@ -1,4 +1,4 @@
-"""Verify suspect map: the answer of `meshmark verify`, its report, and the evidence as layers."""
+"""Verify suspect map: runs `meshmark verify` and adds its evidence as layers."""
 
 import json
 import math
@@ -63,7 +63,7 @@ class Verify(Algorithm):
         )
         self.add(
             QgsProcessingParameterFile("RECORD", tr("Record"), optional=True, extension="json"),
-            tr("The record of one copy: is the suspect that copy? It takes precedence over the record folder."),
+            tr("The record of one copy, to test whether the suspect is that copy. It takes precedence over the folder."),
         )
         folder = QgsProcessingParameterFile.Behavior.Folder
         self.add(
@@ -74,7 +74,7 @@ class Verify(Algorithm):
                 defaultValue=settings.get(settings.RECORD_FOLDER) or None,
                 optional=True,
             ),
-            tr("The records of all copies: which of them is the suspect?"),
+            tr("The records of all copies, to identify the recipient of the suspect."),
         )
         self.add(
             QgsProcessingParameterFileDestination(
@@ -88,7 +88,7 @@ class Verify(Algorithm):
         reports.add_parameters(self)
         self.addOutput(QgsProcessingOutputString("VERDICT", tr("Verdict: match, no-match or inconclusive")))
         self.addOutput(QgsProcessingOutputString("REASON", tr("Why")))
-        self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Whose copy it is; empty without a match")))
+        self.addOutput(QgsProcessingOutputString("RECIPIENT", tr("Recipient of the copy; empty without a match")))
         self.addOutput(QgsProcessingOutputNumber("P_VALUE_LOG10", tr("Probability of such a fit by chance, decimal logarithm")))
         self.addOutput(QgsProcessingOutputNumber("MATCHED_VERTICES", tr("Matched vertices")))
 
@@ -171,7 +171,7 @@ def answer(finished, codes, feedback):
 
 
 def recipients(found):
-    """Returns the recipients of matching copies: several when copies were mixed, none without a match."""
+    """Returns the recipients of matching copies: several for a mixture, none without a match."""
     if found["verdict"] != "match":
         return []
     if not found["candidates"]:

@@ -1,6 +1,6 @@
-//! How often the verifier would accuse the innocent: p-values of wrong keys and of wrong recipients, which must be
-//! uniform. A suspect is examined once as `meshmark verify` does; what depends on key and recipient is then repeated
-//! for many of them.
+//! How often the verifier would accuse the innocent: p-values of wrong keys and of wrong
+//! recipients, which must be uniform. A suspect is examined once as `meshmark verify` does; what
+//! depends on key and recipient is then repeated for many of them.
 
 use crate::plot::{Axis, Plot, Series};
 use meshmark_core::{
@@ -41,7 +41,8 @@ pub struct Sample {
     pub wrong_recipients: Vec<f64>,
 }
 
-/// A kind of suspect: its name, whether it is marked, and the row of Table 2 that it is put through.
+/// A kind of suspect: its name, whether it is marked, and the row of Table 2 that it is put
+/// through.
 const SUSPECTS: [(&str, bool, Option<&str>); 6] = [
     ("marked", true, None),
     ("marked, noise ±50 cm", true, Some("9c")),
@@ -51,9 +52,9 @@ const SUSPECTS: [(&str, bool, Option<&str>); 6] = [
     ("unmarked, local deformation", false, Some("6")),
 ];
 
-/// Takes `count` wrong keys and as many wrong recipients to every suspect made of one map. The right key and, after
-/// it, the wrong ones come from `seed`; no suspect meets those of another, for p-values of one key on two copies of a
-/// map are not independent.
+/// Takes `count` wrong keys and as many wrong recipients to every suspect made of one map. The
+/// right key and, after it, the wrong ones come from `seed`; no suspect meets those of another, for
+/// p-values of one key on two copies of a map are not independent.
 ///
 /// # Errors
 /// A map that cannot be read, marked or registered.

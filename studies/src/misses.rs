@@ -1,5 +1,5 @@
-//! How often the verifier would clear the guilty: verdicts on copies that carry the mark, worn more and more. A copy
-//! may be too worn for a match; "no match" is then a false statement.
+//! How often the verifier would clear the guilty: verdicts on copies that carry the mark, worn more
+//! and more. A copy may be too worn for a match; "no match" is then a false statement.
 
 use meshmark_host_tests::{
     Result,
@@ -48,8 +48,8 @@ const WAYS: [Way; 17] = [
     ("boxes", 0.0, 1.0, |_| Attack::Outline(Outline::BoundingBox)),
 ];
 
-/// Wears `count` copies of a map, each in one or two ways of random strength, and verifies them for their
-/// recipient.
+/// Wears `count` copies of a map, each in one or two ways of random strength, and verifies them for
+/// their recipient.
 ///
 /// # Errors
 /// A map that cannot be read or marked.

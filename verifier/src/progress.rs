@@ -13,7 +13,8 @@ pub struct Progress {
 
 impl Default for Progress {
     fn default() -> Self {
-        let bar = ProgressBar::no_length(); // draws on stderr, and nothing where that is no terminal
+        // It draws on stderr, and nothing where that is no terminal.
+        let bar = ProgressBar::no_length();
         Progress { bar, stage: None, seconds: BTreeMap::new() }
     }
 }

@@ -1,8 +1,8 @@
 //! The command line, pinned: exact stdout, stderr and exit code of tests/cmd/*.toml.
 //!
-//! All cases run in one folder of small files; [`make_files`] says what each of them is. `[..]` stands
-//! for what may differ between machines, `...` for such lines. After a change that is meant, copy the
-//! new output from the failing test.
+//! All cases run in one folder of small files; [`make_files`] describes each of them. `[..]`
+//! stands for what may differ between machines, `...` for such lines. After a change that is meant,
+//! copy the new output from the failing test.
 
 use meshmark_core::key::SecretKey;
 use std::{
@@ -23,7 +23,8 @@ fn the_command_line_is_as_written() {
     make_files(folder.path());
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cmd");
     assert!(cases.read_dir().unwrap().count() > 50, "trycmd is content with no case at all");
-    std::env::set_current_dir(folder.path()).unwrap(); // where trycmd runs a case that names no folder
+    // Here trycmd runs a case that names no folder.
+    std::env::set_current_dir(folder.path()).unwrap();
     trycmd::TestCases::new()
         .default_bin_path(MESHMARK)
         .env("GDAL_DRIVER_PATH", "none") // the verifier needs no plugin
@@ -78,7 +79,8 @@ fn make_files(folder: &Path) {
     );
 }
 
-/// A folder of three records that are good for the test vectors' key and map, and of four files that are not.
+/// A folder of three records that are good for the test vectors' key and map, and of four files
+/// that are not.
 fn make_records(folder: &Path, record: &str) {
     let key = SecretKey::from_json(&read(folder, "key.json")).unwrap();
     let of = |recipient: &str| {

@@ -1,5 +1,5 @@
-//! Suspects that are made to mislead, to stall or to fetch: each gets an answer or a refusal, and nothing else
-//! is read.
+//! Suspects that are made to mislead, to stall or to fetch: each gets an answer or a refusal, and
+//! nothing else is read.
 
 use gdal::{
     Dataset, DatasetOptions, DriverManager, GdalOpenFlags,

@@ -55,8 +55,8 @@ impl Case {
         coords.iter().enumerate().step_by(20).map(label).collect()
     }
 
-    /// Registers, matches and demodulates a suspect whose vertices are `moved`, in canonical order of
-    /// the reference, under a key.
+    /// Registers, matches and demodulates a suspect whose vertices are `moved`, in canonical order
+    /// of the reference, under a key.
     fn demodulate(&self, moved: &[[f64; 2]], key: &SecretKey) -> Demodulation {
         let vertices = &self.reference.vertices;
         let labelled = |vertices: VertexTable, labels| MapData { labels, ..MapData::of_points(vertices) };
@@ -174,7 +174,8 @@ fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
     };
     let mut p: Vec<f64> = (100..140).map(p_mark).collect();
     p.sort_by(f64::total_cmp);
-    // Kolmogorov-Smirnov distance to the uniform distribution; 0.301 is exceeded once in a thousand.
+    // Kolmogorov-Smirnov distance to the uniform distribution; 0.301 is exceeded once in a
+    // thousand.
     let step = |(i, p): (usize, &f64)| (p - i as f64 / 40.0).abs().max((p - (i + 1) as f64 / 40.0).abs());
     let distance = p.iter().enumerate().map(step).fold(0.0, f64::max);
     assert!(distance < 0.301, "{distance}");

@@ -122,7 +122,8 @@ fn register(reference: &Map, suspect: &Map, start: Start) -> Registration {
     Registrar::new(&reference.data(), &METRES, 1.0).register(&suspect.data(), start)
 }
 
-/// Root mean square distance between vertices of the reference and where `there` and back takes them.
+/// Root mean square distance between vertices of the reference and where `there` and back takes
+/// them.
 fn error_m(reference: &Map, there: impl Fn([f64; 2]) -> [f64; 2], back: &Registration) -> f64 {
     let vertices = reference.vertices();
     let returned = back.apply(&vertices.coords().iter().map(|p| there(*p)).collect::<Vec<_>>());

@@ -1,5 +1,5 @@
-//! Lists as text in the syntax of a CSV record: commas separate names, double quotes enclose a name with a
-//! comma, and quotes inside them are doubled.
+//! Lists as text in the syntax of a CSV record: commas separate names, double quotes enclose a name
+//! with a comma, and quotes inside them are doubled.
 
 /// Splits a list into its names; `None` where a quote is not closed or text follows one.
 pub fn split_list(text: &str) -> Option<Vec<String>> {

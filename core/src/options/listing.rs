@@ -7,7 +7,8 @@ pub fn open_option_list_xml() -> String {
     list_xml("OpenOptionList", OPTIONS.iter())
 }
 
-/// Returns the XML list of dataset creation options a GDAL driver declares (DMD_CREATIONOPTIONLIST).
+/// Returns the XML list of dataset creation options a GDAL driver declares
+/// (DMD_CREATIONOPTIONLIST).
 pub fn creation_option_list_xml() -> String {
     list_xml("CreationOptionList", OPTIONS.iter().chain(CREATION_OPTIONS))
 }

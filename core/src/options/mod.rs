@@ -1,5 +1,5 @@
-//! The watermark options: one table defines the driver's option list, the parser, the flags of the command
-//! line and the table in the docs.
+//! The watermark options: one table defines the driver's option list, the parser, the flags of the
+//! command line and the table in the docs.
 
 mod creation;
 mod list;
@@ -40,8 +40,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Parses name-value pairs; names may be in any case. A message that is not given counts as long as a
-    /// recipient's.
+    /// Parses name-value pairs; names may be in any case. A message that is not given counts as
+    /// long as a recipient's.
     ///
     /// # Errors
     /// Fails on an unknown name, a name given twice, a value that its row excludes, both RECIPIENT
@@ -74,8 +74,8 @@ impl Options {
         })
     }
 
-    /// Returns the value of an option in its one canonical spelling, which parses to it: equal texts are equal
-    /// values. `None` where the option is not given.
+    /// Returns the value of an option in its one canonical spelling, which parses to it: equal
+    /// texts are equal values. `None` where the option is not given.
     ///
     /// # Panics
     /// Panics when `option` is no row of [`OPTIONS`].
@@ -103,7 +103,7 @@ impl Options {
     /// Checks values that do not come from [`Options::parse`].
     ///
     /// # Errors
-    /// Those of [`Options::parse`].
+    /// Returns the errors of [`Options::parse`].
     pub fn check(&self) -> Result<()> {
         let texts: Vec<_> = OPTIONS.iter().filter_map(|o| Some((o.name, self.text_of(o.name)?))).collect();
         Options::parse(texts.iter().map(|(name, text)| (*name, text.as_str()))).map(|_| ())

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The numbers that shape a mark; with the key, the message and the reference they determine it. Records and
-/// reports hold them as they are here.
+/// The numbers that shape a mark; with the key, the message and the reference they determine it.
+/// Records and reports hold them as they are here.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameters {
     /// α, amplitude per coefficient, metres on the ground.
@@ -54,8 +54,8 @@ impl Code {
         Self::NAMES[self as usize].to_lowercase()
     }
 
-    /// Returns CODE when it is not given: LDPC for messages it can carry, as it recovers more of them from
-    /// the same displacement (docs/evaluation.md).
+    /// Returns CODE when it is not given: LDPC for messages it can carry, as it recovers more of
+    /// them from the same displacement (docs/evaluation.md).
     pub fn default_for(message_bits: usize) -> Self {
         if message_bits == LDPC_MESSAGE_BITS { Code::Ldpc } else { Code::Repetition }
     }
@@ -80,7 +80,8 @@ impl Code {
 pub enum Rigidity {
     /// None but hanging vertices with their anchors.
     Free,
-    /// Those of a building: a group of polygons that share vertices or walls, see [`crate::bodies`].
+    /// Those of a building: a group of polygons that share vertices or walls, see
+    /// [`crate::bodies`].
     Rigid,
 }
 

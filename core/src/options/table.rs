@@ -2,8 +2,8 @@
 
 use super::parameters::{Code, Laplacian, Rigidity};
 
-/// The smallest and the largest PATCH_SIZE: fewer vertices carry no useful message, more need minutes and
-/// gigabytes for each solution.
+/// The smallest and the largest PATCH_SIZE: fewer vertices carry no useful message, more need
+/// minutes and gigabytes for each solution.
 pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
 
 /// The length of the message of a RECIPIENT.

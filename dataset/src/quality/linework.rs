@@ -67,8 +67,8 @@ impl Linework {
         distance2.unwrap_or(0.0).sqrt()
     }
 
-    /// Returns whether two geometries of closed rings are disjoint, as far as this can be decided without
-    /// computing their intersection. It is exact where the result is true.
+    /// Returns whether two geometries of closed rings are disjoint, as far as this can be decided
+    /// without computing their intersection. It is exact where the result is true.
     pub fn is_apart_from(&self, other: &Linework) -> bool {
         let (few, many) = if self.len() <= other.len() { (self, other) } else { (other, self) };
         let meets = |line: &Line<[f64; 2]>| many.near(line.envelope()).any(|near| may_meet(line, near));
@@ -77,8 +77,8 @@ impl Linework {
             && !many.firsts.iter().any(|point| few.encloses(*point))
     }
 
-    /// Returns whether a point on no segment is inside, which it is when the number of segments to its right
-    /// is odd.
+    /// Returns whether a point on no segment is inside, which it is when the number of segments to
+    /// its right is odd.
     fn encloses(&self, [x, y]: [f64; 2]) -> bool {
         if !self.bounds.contains_point(&[x, y]) {
             return false;
@@ -93,8 +93,8 @@ impl Linework {
     }
 }
 
-/// Returns the Hausdorff distance of two geometries whose vertices correspond, with x and y multiplied by
-/// `scale`.
+/// Returns the Hausdorff distance of two geometries whose vertices correspond, with x and y
+/// multiplied by `scale`.
 pub fn hausdorff(before: &Outline, after: &Outline, scale: [f64; 2]) -> f64 {
     let place = |p: &[f64; 2]| [p[0] * scale[0], p[1] * scale[1]];
     let [from, to] = [before, after].map(|outline| outline.chains.iter().flatten().map(place));

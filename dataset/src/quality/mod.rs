@@ -1,7 +1,7 @@
 //! The quality of marked geometries: areas, Hausdorff distances, validity and overlaps.
 //!
-//! GEOS decides validity and computes areas of intersections, but only of geometries that may overlap. An
-//! error handler may show its messages about invalid geometries.
+//! GEOS decides validity and computes areas of intersections, but only of geometries that may
+//! overlap. An error handler may show its messages about invalid geometries.
 
 mod linework;
 mod overlaps;
@@ -62,7 +62,8 @@ pub struct BeforeAfter<'a> {
     pub after: (Outlines<'a>, &'a State),
     /// Metres per unit.
     pub measure: Measure<'a>,
-    /// The grid of the map after, CRS units; 0 without one. Overlaps up to a cell of it are slivers.
+    /// The grid of the map after, CRS units; 0 without one. Overlaps up to a cell of it are
+    /// slivers.
     pub grid: f64,
 }
 

@@ -44,7 +44,8 @@ pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> CommonAreas 
     boxes.par_iter().flat_map_iter(of_polygon).collect()
 }
 
-/// Returns the segments of all polygons with many vertices; `None` for those that do not consist of rings.
+/// Returns the segments of all polygons with many vertices; `None` for those that do not consist of
+/// rings.
 fn large(outlines: Outlines, boxes: &[NumberedBounds]) -> BTreeMap<u32, Option<Linework>> {
     let sorted = |polygon: &NumberedBounds| {
         let outline = (outlines.get)(polygon.data as usize);
@@ -98,9 +99,9 @@ fn are_apart(one: &Option<Linework>, other: &Option<Linework>) -> bool {
     one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one.is_apart_from(other))
 }
 
-/// Counts the overlaps among polygons that are valid before and after, and lists the new ones. `common` are
-/// the common areas before and after, `scale` metres per unit at a polygon, `grid` as in
-/// [`super::BeforeAfter`].
+/// Counts the overlaps among polygons that are valid before and after, and lists the new ones.
+/// `common` are the common areas before and after, `scale` metres per unit at a polygon, `grid` as
+/// in [`super::BeforeAfter`].
 pub(super) fn compare(
     common: [&CommonAreas; 2],
     is_valid: impl Fn(u32) -> bool,

@@ -1,5 +1,6 @@
-//! Absence: whether a mark that does not show is not there. "No match" is a statement like "match" and has its own
-//! error rate: the probability that a mark which the suspect carries would be missed.
+//! Absence: whether a mark that does not show is not there. "No match" is a statement like "match"
+//! and has its own error rate: the probability that a mark which the suspect carries would be
+//! missed.
 
 use super::{MARK, Verdict, survival};
 use crate::power::Power;
@@ -11,11 +12,12 @@ const MOST_MISSED_LOG10: f64 = -3.0;
 const SUSPICIOUS_LOG10: f64 = -2.0;
 /// No smaller probability of missing a mark is stated: the studies support no more.
 const LEAST_MISSED_LOG10: f64 = -6.0;
-/// Standard deviation of the score of a mark around that of one trial mark on the same suspect: each varies by up
-/// to 1.3 where noise differs from place to place, so that the variance of their difference is 2 · 1.3².
+/// Standard deviation of the score of a mark around that of one trial mark on the same suspect:
+/// each varies by up to 1.3 where noise differs from place to place, so that the variance of their
+/// difference is 2 · 1.3².
 const TRIAL_DEVIATION: f64 = 1.84;
-/// The bits of a copy of one recipient have this share of the energy of a message, or more; those of an average or
-/// a patchwork of copies have less.
+/// The bits of a copy of one recipient have this share of the energy of a message, or more; those
+/// of an average or a patchwork of copies have less.
 const LEAST_FULLNESS: f64 = 0.85;
 /// Least standard deviation of the agreement of a recipient's bits.
 const LEAST_DEVIATION: f64 = 0.1;
@@ -87,7 +89,8 @@ impl Unmatched<'_> {
         })
     }
 
-    /// Returns log₁₀ of the probability that a present mark has a score below `needed`, or the least that is stated.
+    /// Returns log₁₀ of the probability that a present mark has a score below `needed`, or the
+    /// least that is stated.
     fn missed_log10(&self, needed: f64) -> f64 {
         let of_recipient = {
             // With the mark present b̂_j has mean 1 − v_j and variance v_j (1 − v_j).

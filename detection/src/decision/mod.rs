@@ -91,8 +91,8 @@ pub struct Decision {
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the probability of this much agreement under the null hypothesis about the message.
     pub p_recipient_log10: Option<f64>,
-    /// log₁₀ of the probability that the test misses a mark which the suspect carries; `None` for a match, and
-    /// where it is unknown.
+    /// log₁₀ of the probability that the test misses a mark which the suspect carries; `None` for a
+    /// match, and where it is unknown.
     pub p_missed_log10: Option<f64>,
     /// Number of messages that were tried.
     pub tried: usize,
@@ -127,8 +127,8 @@ impl Decision {
     }
 }
 
-/// Decides whether a demodulation matches the expected message, one of the `tried` messages; `power` is what a
-/// present mark would show on the suspect.
+/// Decides whether a demodulation matches the expected message, one of the `tried` messages;
+/// `power` is what a present mark would show on the suspect.
 pub fn decide_among(
     found: &Demodulation,
     power: Power,

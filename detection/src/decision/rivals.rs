@@ -20,7 +20,8 @@ pub struct Standing {
     /// log₁₀ of the probability that a copy with the most similar other message gives this much
     /// evidence for the expected one.
     pub p_log10: f64,
-    /// Whether some bits are much weaker than the rest, as in an average of copies with other messages.
+    /// Whether some bits are much weaker than the rest, as in an average of copies with other
+    /// messages.
     pub is_mixed: bool,
 }
 

@@ -19,7 +19,8 @@ pub fn normal_log10(score: f64) -> f64 {
     ln / LN_10
 }
 
-/// Returns the score that a standard normal variable exceeds with probability `p`, for p from 10⁻³⁰⁰ to ½.
+/// Returns the score that a standard normal variable exceeds with probability `p`, for p from
+/// 10⁻³⁰⁰ to ½.
 pub fn normal_quantile(p: f64) -> f64 {
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..60 {

@@ -131,8 +131,8 @@ impl<'a> Near<'a> {
         Near { matcher, suspect, tree: matcher.tree_of(suspect) }
     }
 
-    /// Returns the displacements to at most `most` suspect vertices within `radius_m` of a reference vertex,
-    /// metres.
+    /// Returns the displacements to at most `most` suspect vertices within `radius_m` of a
+    /// reference vertex, metres.
     pub fn displacements_m(&self, vertex: u32, radius_m: f64, most: usize) -> Vec<[f64; 2]> {
         let from = self.matcher.reference[vertex as usize];
         let within = self.matcher.within(&self.tree, from, radius_m).take(most);

@@ -1,10 +1,11 @@
-//! The matching radius, chosen from the distances of mutual nearest neighbours. No key is involved, so decoys
-//! have the same radius.
+//! The matching radius, chosen from the distances of mutual nearest neighbours. No key is involved,
+//! so decoys have the same radius.
 
 use super::{chance::out_of_place, matcher::Matcher, matches::Matches};
 use serde::Serialize;
 
-/// The radii that are tried, metres. The first one is large enough for a mark and for the noise of most formats.
+/// The radii that are tried, metres. The first one is large enough for a mark and for the noise of
+/// most formats.
 const RADII_M: [f64; 6] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
 /// The share of the vertices found within the largest radius that the chosen radius holds.
 const ENOUGH: f64 = 0.97;
@@ -52,8 +53,8 @@ impl RadiusChoice {
         }
     }
 
-    /// Returns the radius for vertices of a suspect in the CRS of the reference; `unit_m` are the metres per unit
-    /// in the middle of the reference.
+    /// Returns the radius for vertices of a suspect in the CRS of the reference; `unit_m` are the
+    /// metres per unit in the middle of the reference.
     pub(crate) fn choose(self, matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius {
         match self {
             RadiusChoice::Given(metres) => Radius { metres, reason: RadiusReason::Given },
@@ -78,9 +79,9 @@ fn from_data(matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius 
     Radius { metres: RADII_M[first], reason }
 }
 
-/// Returns how many of `found` matches are more than chance, where a shifted suspect has `by_chance` matches and
-/// at most `most` vertices can match. A vertex with its own match has none by chance: e = found − (1 − e / most)
-/// by_chance.
+/// Returns how many of `found` matches are more than chance, where a shifted suspect has
+/// `by_chance` matches and at most `most` vertices can match. A vertex with its own match has none
+/// by chance: e = found − (1 − e / most) by_chance.
 fn excess(found: f64, by_chance: f64, most: f64) -> f64 {
     if by_chance >= most { 0.0 } else { ((found - by_chance) / (1.0 - by_chance / most)).max(0.0) }
 }

@@ -20,7 +20,8 @@ pub fn consensus(pairs: &[[[f64; 2]; 2]], unit: [f64; 2], metres: f64) -> Option
     let cost = |affine: &Affine| -> f64 {
         pairs.iter().map(|pair| miss(affine, pair).min(metres).powi(2)).sum::<f64>()
     };
-    let mut random = ChaCha8Rng::seed_from_u64(0x6d65_7368); // any fixed seed: same input, same answer
+    // Any fixed seed gives the same answer for the same input.
+    let mut random = ChaCha8Rng::seed_from_u64(0x6d65_7368);
     let mut best: Option<(f64, Affine)> = None;
     for _ in 0..1000 {
         let chosen = [(); 3].map(|()| pairs[random.next_u64() as usize % pairs.len()]);

@@ -15,8 +15,8 @@ pub struct Motion {
     pub degrees: f64,
 }
 
-/// Shifts and turns every body: a polygon, or the polygons of one layer that share vertices, such as the houses
-/// of a terrace. Lines and points stay.
+/// Shifts and turns every body: a polygon, or the polygons of one layer that share vertices, such
+/// as the houses of a terrace. Lines and points stay.
 ///
 /// # Errors
 /// A body without a centroid.

@@ -6,9 +6,11 @@ use geo::{
     algorithm::buffer::{BufferStyle, LineJoin},
 };
 
-/// A corner sharper than this, in radians, is not drawn out to a mitre; GIS stop at five times the distance.
+/// A corner sharper than this, in radians, is not drawn out to a mitre; GIS stop at five times the
+/// distance.
 const SHARPEST_MITRE: f64 = 0.4;
-/// A tolerance, units of the CRS, that takes away the splinters of edges that the offset leaves at blunt corners.
+/// A tolerance, units of the CRS, that takes away the splinters of edges that the offset leaves at
+/// blunt corners.
 const SPLINTERS: f64 = 0.01;
 
 /// What becomes of a convex corner.

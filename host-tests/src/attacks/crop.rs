@@ -87,7 +87,8 @@ fn clip(geometry: &Geometry, window: Rect, mask: &vector::Geometry) -> Result<Op
     Ok(same_dimension(piece.to_geo()?, geometry))
 }
 
-/// Where a polygon only touches the border GEOS leaves a line or a point; no clipping tool keeps those.
+/// Where a polygon only touches the border GEOS leaves a line or a point; no clipping tool keeps
+/// those.
 fn same_dimension(piece: Geometry, original: &Geometry) -> Option<Geometry> {
     if piece.dimensions() != original.dimensions() {
         return None;

@@ -6,16 +6,18 @@ use super::{
 };
 use geo::{ChaikinSmoothing, Coord};
 
-/// The distance along a curve after which the errors of a tracing hand have lost most of their likeness.
+/// The distance along a curve after which the errors of a tracing hand have lost most of their
+/// likeness.
 const HAND: f64 = 3.0;
 
 /// How lines and rings are drawn anew. Points stay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Redrawing {
-    /// A vertex at every such distance along the curve, from a random place on, and none of the old ones.
+    /// A vertex at every such distance along the curve, from a random place on, and none of the old
+    /// ones.
     Resample { spacing: f64 },
-    /// Resampled, and every new vertex off by Gaussian errors of this deviation, which are alike along the curve over
-    /// about [`HAND`]. Where a ring closes, its ends need not fit.
+    /// Resampled, and every new vertex off by Gaussian errors of this deviation, which are alike
+    /// along the curve over about [`HAND`]. Where a ring closes, its ends need not fit.
     Trace { spacing: f64, deviation: f64 },
     /// Corners cut at a quarter and three quarters of every edge (Chaikin 1974), so many times.
     Chaikin { rounds: usize },
@@ -63,8 +65,8 @@ fn by_hand(places: &[Coord], deviation: f64, random: &mut Random) -> Vec<Coord> 
     drawn
 }
 
-/// Places along a line or ring, `spacing` apart; closer where it is too short for the fewest vertices it needs.
-/// The first is a share of the spacing away from the start.
+/// Places along a line or ring, `spacing` apart; closer where it is too short for the fewest
+/// vertices it needs. The first is a share of the spacing away from the start.
 pub(super) fn walk(part: Part, run: &[Coord], spacing: f64, phase: f64) -> Vec<Coord> {
     let length = |(a, b): (Coord, Coord)| (b.x - a.x).hypot(b.y - a.y);
     let total: f64 = part.edges(run).map(length).sum();

@@ -21,8 +21,8 @@ pub enum Side {
     Vertex { unit: f64 },
 }
 
-/// Turns every vertex about the centre of its cell, to one side when the column and row (or the vertex's own
-/// coordinates) have an even sum, to the other when it is odd.
+/// Turns every vertex about the centre of its cell, to one side when the column and row (or the
+/// vertex's own coordinates) have an even sum, to the other when it is odd.
 ///
 /// # Errors
 /// Coordinates that are not finite.

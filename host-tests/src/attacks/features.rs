@@ -15,7 +15,8 @@ pub fn delete(map: &Map, share: f64, seed: u64) -> Map {
     map
 }
 
-/// Exchanges the geometries of a share of the features for those of an unmarked map, by layer and feature id.
+/// Exchanges the geometries of a share of the features for those of an unmarked map, by layer and
+/// feature id.
 ///
 /// # Errors
 /// A feature that the unmarked map does not have.
@@ -41,7 +42,8 @@ pub fn exchange(map: &Map, unmarked: &Map, share: f64, seed: u64) -> Result<Map>
     Ok(map)
 }
 
-/// Puts layers and features in random order and takes their ids away, for by id they would be sorted again.
+/// Puts layers and features in random order and takes their ids away, for by id they would be
+/// sorted again.
 pub fn scramble(map: &Map, seed: u64) -> Map {
     let mut random = Random::new(seed);
     let mut map = map.clone();

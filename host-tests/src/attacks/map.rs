@@ -1,5 +1,5 @@
-//! A map in memory, which attacks take and give: layers, attributes and feature ids of any GDAL dataset,
-//! geometries in the plane (Z and M are left behind).
+//! A map in memory, which attacks take and give: layers, attributes and feature ids of any GDAL
+//! dataset, geometries in the plane (Z and M are left behind).
 
 use crate::Result;
 use gdal::{
@@ -118,7 +118,8 @@ impl Map {
         self
     }
 
-    /// The same map with every geometry replaced; a feature whose geometry becomes `None` goes with it.
+    /// The same map with every geometry replaced; a feature whose geometry becomes `None` goes with
+    /// it.
     pub fn map_geometries(&self, mut f: impl FnMut(&Geometry) -> Option<Geometry>) -> Map {
         let Ok(map) = self.try_map_geometries::<Infallible>(|geometry| Ok(f(geometry)));
         map
@@ -200,7 +201,8 @@ fn write_layer(dataset: &mut Dataset, layer: &Layer) -> Result<()> {
         ty: layer.geometry_type,
         options: Some(&[&format!("FID={FID_COLUMN}")]),
     })?;
-    // The bindings cannot set a feature's id, but the driver takes it from a field of the column's name.
+    // The bindings cannot set a feature's id, but the driver takes it from a field of the column's
+    // name.
     FieldDefn::new(FID_COLUMN, OGRFieldType::OFTInteger64)?.add_to_layer(&created)?;
     let is_attribute = |field: &Field| !field.name.eq_ignore_ascii_case(FID_COLUMN);
     for field in layer.fields.iter().filter(|field| is_attribute(field)) {

@@ -1,8 +1,9 @@
-//! Attacks on marked maps: those of Table 2 of the paper, and what else happens to maps, by malice or not.
+//! Attacks on marked maps: those of Table 2 of the paper, and what else happens to maps, by malice
+//! or not.
 //!
-//! An attack is a pure function from a map (and a seed) to a map. Layers, attributes, feature ids and the CRS
-//! stay as they are where the attack is not about them. Where it speaks of vertices, a vertex that several
-//! features share is one vertex.
+//! An attack is a pure function from a map (and a seed) to a map. Layers, attributes, feature ids
+//! and the CRS stay as they are where the attack is not about them. Where it concerns vertices, a
+//! vertex that several features share is one vertex.
 
 pub mod bodies;
 pub mod buffers;
@@ -160,7 +161,8 @@ impl Attack {
         }
     }
 
-    /// How strong it is, for attacks that come in strengths: the number that names it, in its own unit.
+    /// How strong it is, for attacks that come in strengths: the number that names it, in its own
+    /// unit.
     pub fn strength(&self) -> Option<f64> {
         match self {
             Attack::Snap { spacing } | Attack::Densify { spacing } => Some(*spacing),

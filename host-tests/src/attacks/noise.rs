@@ -16,7 +16,8 @@ pub fn add(map: &Map, seed: u64, draw: impl Fn(&mut Random) -> f64) -> Result<Ma
     }))
 }
 
-/// Adds Gaussian noise to the vertices of a share of the features; a vertex they share with others parts there.
+/// Adds Gaussian noise to the vertices of a share of the features; a vertex they share with others
+/// parts there.
 ///
 /// # Errors
 /// Coordinates that are not finite.
@@ -40,7 +41,8 @@ pub fn redraw(map: &Map, share: f64, deviation: f64, seed: u64) -> Result<Map> {
 
 /// Puts every vertex on the nearest node of a grid through the origin.
 pub fn snap(map: &Map, spacing: f64) -> Map {
-    // Nodes of a spacing such as 0.1 are k / 10, the numbers that print as one decimal; k × 0.1 are not.
+    // Nodes of a spacing such as 0.1 are k / 10, the numbers that print as one decimal; k × 0.1 are
+    // not.
     let per_unit = 1.0 / spacing;
     let whole = (per_unit - per_unit.round()).abs() < 1e-9;
     let node = |value: f64| match whole {

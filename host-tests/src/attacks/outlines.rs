@@ -1,4 +1,5 @@
-//! Attacks that leave of every polygon something simpler that stands for it, and nothing else of the map.
+//! Attacks that leave of every polygon something simpler that stands for it, and nothing else of
+//! the map.
 
 use super::{Map, parts::is_polygonal};
 use geo::{BoundingRect, Centroid, Geometry, MinimumRotatedRect};

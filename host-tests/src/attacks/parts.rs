@@ -37,7 +37,8 @@ impl Part {
 /// What takes the place of a run of vertices. Too few for the part and it is dropped.
 pub type Rewrite<'a> = &'a mut dyn FnMut(Part, &[Coord]) -> Vec<Coord>;
 
-/// Rewrites every part of a geometry. A polygon goes with its outer ring, a geometry with its last part.
+/// Rewrites every part of a geometry. A polygon goes with its outer ring, a geometry with its last
+/// part.
 pub fn rewrite(geometry: &Geometry, f: Rewrite) -> Option<Geometry> {
     match geometry {
         Geometry::Point(p) => point(p, f).map(Geometry::Point),

@@ -5,8 +5,9 @@ use crate::Result;
 use geo::Geometry;
 use std::collections::HashSet;
 
-/// Keeps the features that lie in a circle around a random vertex, which grows until they have so many distinct
-/// vertices. A feature that would exceed the count is passed over; the piece is complete at nine tenths of it.
+/// Keeps the features that lie in a circle around a random vertex, which grows until they have so
+/// many distinct vertices. A feature that would exceed the count is passed over; the piece is
+/// complete at nine tenths of it.
 ///
 /// # Errors
 /// A map without vertices.

@@ -1,4 +1,5 @@
-//! Attacks by formats that have coordinates on a grid: vector tiles, TopoJSON, drawings for the screen.
+//! Attacks by formats that have coordinates on a grid: vector tiles, TopoJSON, drawings for the
+//! screen.
 
 use super::{
     Map,
@@ -25,7 +26,8 @@ pub enum Quantisation {
     VectorTiles { zoom: i32 },
     /// Ten thousand points over the extent, in the map's CRS.
     TopoJson,
-    /// A drawing so many pixels wide, with two decimals and y downwards, without CRS and attributes.
+    /// A drawing so many pixels wide, with two decimals and y downwards, without CRS and
+    /// attributes.
     Svg { width: f64 },
 }
 

@@ -63,8 +63,8 @@ impl Random {
     }
 }
 
-/// A random value for every distinct vertex of a map: occurrences of a vertex share it, and it does not
-/// depend on the order of features.
+/// A random value for every distinct vertex of a map: occurrences of a vertex share it, and it does
+/// not depend on the order of features.
 pub struct PerVertex<T> {
     table: VertexTable,
     values: Vec<T>,

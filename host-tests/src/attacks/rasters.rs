@@ -11,12 +11,12 @@ use crate::Result;
 use gdal::{DriverManager, raster::rasterize, vector::ToGdal};
 use geo::{BoundingRect, Coord, Geometry, LineString, Polygon, Rect, Simplify, unary_union};
 
-/// The tolerance of simplification, pixels: the middles of stairs lie in a strip of this width along a straight
-/// wall, so less would leave stairs.
+/// The tolerance of simplification, pixels: the middles of stairs lie in a strip of this width
+/// along a straight wall, so less would leave stairs.
 const SMOOTHING_PIXELS: f64 = 1.0;
 
-/// Polygons as they come back from a raster with pixels of this size, units of the CRS, each from a band of its own;
-/// nothing else of the map is left, and no attributes.
+/// Polygons as they come back from a raster with pixels of this size, units of the CRS, each from a
+/// band of its own; nothing else of the map is left, and no attributes.
 ///
 /// # Errors
 /// What GDAL says.
@@ -35,8 +35,8 @@ fn traced(geometry: &Geometry, pixel: f64) -> Result<Option<Geometry>> {
     Ok(rewrite(&stairs, &mut |_, run| between_the_stairs(run, pixel)))
 }
 
-/// A straight outline for one of stairs: the middles of its pixels' edges, simplified. Tracers such as potrace do
-/// much the same, but draw curves.
+/// A straight outline for one of stairs: the middles of its pixels' edges, simplified. Tracers such
+/// as potrace do much the same, but draw curves.
 fn between_the_stairs(run: &[Coord], pixel: f64) -> Vec<Coord> {
     let mut middles = walk(Part::Ring, run, pixel, 0.5);
     middles.push(middles[0]);
@@ -45,7 +45,8 @@ fn between_the_stairs(run: &[Coord], pixel: f64) -> Vec<Coord> {
     outline
 }
 
-/// The pixels whose centres a geometry covers, on a grid through the origin: each run of a row as a rectangle.
+/// The pixels whose centres a geometry covers, on a grid through the origin: each run of a row as a
+/// rectangle.
 fn runs_of_pixels(geometry: &Geometry, pixel: f64) -> Result<Vec<Polygon>> {
     let Some(bounds) = geometry.bounding_rect() else { return Ok(Vec::new()) };
     let west = (bounds.min().x / pixel).floor();

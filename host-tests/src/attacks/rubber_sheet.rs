@@ -30,8 +30,9 @@ impl Wave {
     }
 }
 
-/// Moves every vertex by a field of displacements, of which either coordinate is a sum of a few plane waves of
-/// random directions and phases. `amplitude` is the sum of theirs: no coordinate moves further.
+/// Moves every vertex by a field of displacements, of which either coordinate is a sum of a few
+/// plane waves of random directions and phases. `amplitude` is the sum of theirs: no coordinate
+/// moves further.
 ///
 /// # Errors
 /// Coordinates that are not finite.

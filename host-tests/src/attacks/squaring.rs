@@ -1,8 +1,8 @@
 //! Squaring: almost right angles of polygons are made right, as editors offer for buildings.
 //!
-//! The method is the one of iD, the OpenStreetMap editor: a corner moves along its bisector until it is
-//! square, in small steps, all corners at once. Vertices that polygons share move by the mean of what their
-//! corners want, so walls stay shared.
+//! The method is the one of iD, the OpenStreetMap editor: a corner moves along its bisector until
+//! it is square, in small steps, all corners at once. Vertices that polygons share move by the mean
+//! of the moves of their corners, so walls stay shared.
 
 use super::{
     Map,

@@ -9,7 +9,8 @@ use crate::Result;
 use gdal::vector::ToGdal;
 use geo::{Geometry, LineString, MultiLineString, MultiPolygon, Orient, orient::Direction, unary_union};
 
-/// Joins the polygons of every layer where they meet; what is joined has no attributes, so none are left.
+/// Joins the polygons of every layer where they meet; what is joined has no attributes, so none are
+/// left.
 pub fn dissolve(map: &Map) -> Map {
     let mut map = drop_attributes(map).of_any_type();
     for layer in &mut map.layers {
@@ -22,8 +23,8 @@ pub fn dissolve(map: &Map) -> Map {
     map
 }
 
-/// Cuts all lines and outlines at all their crossings and keeps what lies twice once: one layer of lines, without
-/// attributes.
+/// Cuts all lines and outlines at all their crossings and keeps what lies twice once: one layer of
+/// lines, without attributes.
 ///
 /// # Errors
 /// What GEOS says of the lines.

@@ -101,7 +101,8 @@ fn edges(map: &Map) -> BTreeSet<Edge> {
     edges
 }
 
-/// Simplifies every line and ring by itself (Douglas and Peucker 1973), as `ogr2ogr -simplify` does.
+/// Simplifies every line and ring by itself (Douglas and Peucker 1973), as `ogr2ogr -simplify`
+/// does.
 pub fn simplify(map: &Map, tolerance: f64) -> Map {
     map.map_geometries(|geometry| {
         Some(match geometry {
@@ -114,8 +115,8 @@ pub fn simplify(map: &Map, tolerance: f64) -> Map {
     })
 }
 
-/// Takes the vertices out of every line and ring, each by itself, that span triangles under this area with their
-/// neighbours, smallest first (Visvalingam and Whyatt 1993).
+/// Takes the vertices out of every line and ring, each by itself, that span triangles under this
+/// area with their neighbours, smallest first (Visvalingam and Whyatt 1993).
 pub fn simplify_by_area(map: &Map, area: f64) -> Map {
     map.map_geometries(|geometry| {
         Some(match geometry {
@@ -128,8 +129,8 @@ pub fn simplify_by_area(map: &Map, area: f64) -> Map {
     })
 }
 
-/// Deletes a share of the distinct vertices, chosen at random. A part that is left with too few goes whole,
-/// and its vertices count: the share is met to within the last part.
+/// Deletes a share of the distinct vertices, chosen at random. A part that is left with too few
+/// goes whole, and its vertices count: the share is met to within the last part.
 ///
 /// # Errors
 /// Coordinates that are not finite.

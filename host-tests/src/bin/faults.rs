@@ -1,4 +1,5 @@
-//! Kills writers of marked maps, and fills their disks, more often than the tests do: `make faults`.
+//! Kills writers of marked maps, and fills their disks, more often than the tests do:
+//! `make faults`.
 
 use clap::Parser;
 use meshmark_host_tests::faults::{Distribution, Fault, Outcome, Scene};

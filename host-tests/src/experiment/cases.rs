@@ -60,8 +60,8 @@ impl Case {
         }
     }
 
-    /// The demodulators it is measured with: colluders are many, so they only meet the default one, and the paper
-    /// has no code.
+    /// The demodulators it is measured with: colluders are many, so they only meet the default one,
+    /// and the paper has no code.
     pub fn demodulators(&self, profile: Profile) -> &'static [&'static str] {
         match self {
             Case::Collusion { .. } => &["joint"],

@@ -35,7 +35,8 @@ pub struct Plan {
     pub seed: u64,
     /// Processes at a time.
     pub workers: usize,
-    /// Where to keep references, copies, records, keys and suspects, to look into a verdict afterwards.
+    /// Where to keep references, copies, records, keys and suspects, to look into a verdict
+    /// afterwards.
     pub keep: Option<PathBuf>,
 }
 
@@ -115,8 +116,8 @@ struct Question {
 /// Runs a plan; `report` is called with every outcome as it comes.
 ///
 /// # Errors
-/// Maps that cannot be read, are not in metres or cannot be marked. A suspect that cannot be verified is an
-/// outcome, not an error.
+/// Maps that cannot be read, are not in metres or cannot be marked. A suspect that cannot be
+/// verified is an outcome, not an error.
 pub fn run(product: &Product, plan: &Plan, report: impl Fn(&Outcome) + Sync) -> Result<Vec<Outcome>> {
     let temporary = tempfile::tempdir()?;
     let folder = plan.keep.as_deref().unwrap_or(temporary.path());

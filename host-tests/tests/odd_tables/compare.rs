@@ -1,4 +1,5 @@
-//! What differs between the file of plain `ogr2ogr` and a marked one, but for coordinates that moved a little.
+//! What differs between the file of plain `ogr2ogr` and a marked one, but for coordinates that
+//! moved a little.
 
 use meshmark_host_tests::{
     contents::{self, LayerContents},
@@ -31,7 +32,8 @@ fn companions(plain: &Path, marked: &Path) -> Option<String> {
     Some(format!("the .{ending} differs"))
 }
 
-/// The text of a GeoJSON file, in which numbers near the houses, longitudes of 24.9 and latitudes of 60.2, are rounded.
+/// The text of a GeoJSON file, in which numbers near the houses, longitudes of 24.9 and latitudes
+/// of 60.2, are rounded.
 fn without_places(host: &Host, file: &str) -> Vec<String> {
     let bytes = fs::read(host.path(file)).unwrap();
     let rounded = |word: &str| match word.parse::<f64>() {

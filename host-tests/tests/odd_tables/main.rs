@@ -1,6 +1,7 @@
-//! Odd tables, on all three ways a mark gets into a file, against plain `ogr2ogr`: whatever the names of layers and fields
-//! and whatever the values, nothing differs but the coordinates, and those by less than TOLERANCE. What plain `ogr2ogr`
-//! refuses is refused; anything else is refused only by a sentence of [`DOCUMENTED`].
+//! Odd tables, on all three ways a mark gets into a file, against plain `ogr2ogr`: whatever the
+//! names of layers and fields and whatever the values, nothing differs but the coordinates, and
+//! those by less than TOLERANCE. What plain `ogr2ogr` refuses is refused; anything else is refused
+//! only by a sentence of [`DOCUMENTED`].
 
 mod compare;
 mod sources;
@@ -29,8 +30,8 @@ const FORMATS: [(&str, &str); 5] = [
 /// How many tables are made; each goes into one format on all ways.
 const TABLES: u64 = 120;
 
-/// Refusals of what plain `ogr2ogr` writes: a part of the sentence, which docs/driver.md or docs/distribute.md has, and
-/// why it is so.
+/// Refusals of what plain `ogr2ogr` writes: a part of the sentence, which docs/driver.md or
+/// docs/distribute.md has, and why it is so.
 const DOCUMENTED: &[(&str, &str)] = &[(
     "FlatGeobuf with a spatial index leaves out features without a geometry",
     "plain ogr2ogr drops them without a word; a map that is marked as a whole is not to lose any",

@@ -1,4 +1,5 @@
-//! Counts false alarms: p-values of wrong keys and wrong recipients on marked, attacked and unmarked maps.
+//! Counts false alarms: p-values of wrong keys and wrong recipients on marked, attacked and
+//! unmarked maps.
 
 use clap::Parser;
 use meshmark_host_tests::{Result, product::Product};

@@ -1,6 +1,6 @@
-//! What marking does to maps: `quality MAP...` marks each with every SHAPE and BASIS through the driver, compares it
-//! with the original by `meshmark compare`, and prints a Markdown table. It fails when a polygon has become
-//! invalid, or two overlap that did not.
+//! What marking does to maps: `quality MAP...` marks each with every SHAPE and BASIS through the
+//! driver, compares it with the original by `meshmark compare`, and prints a Markdown table. It
+//! fails when a polygon has become invalid, or two overlap that did not.
 
 use clap::Parser;
 use meshmark_core::{

@@ -1,9 +1,9 @@
-//! How exactly `meshmark verify` finds the way back: `registration_accuracy MAP...` marks maps, puts the copies
-//! through affine maps drawn at random, verifies them, and prints a Markdown table of what is left of the way
-//! there and back.
+//! How exactly `meshmark verify` finds the way back: `registration_accuracy MAP...` marks maps,
+//! puts the copies through affine maps drawn at random, verifies them, and prints a Markdown table
+//! of what is left of the way there and back.
 //!
-//! The error of a registration is the root mean square, over vertices of the reference, of the distance between
-//! a vertex and where the true affine map and then the recovered one take it.
+//! The error of a registration is the root mean square, over vertices of the reference, of the
+//! distance between a vertex and where the true affine map and then the recovered one take it.
 
 use clap::Parser;
 use geo::{CoordsIter, Geometry};
@@ -91,7 +91,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// A row of the table: one map. `longest`: seconds of the longest registration so far, for every suspect.
+/// A row of the table: one map. `longest`: seconds of the longest registration so far, for every
+/// suspect.
 fn row(product: &Product, path: &Path, seed: u64, longest: &mut [f64]) -> Result<String> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str| folder.path().join(name);
@@ -136,7 +137,8 @@ fn points(map: &Map) -> Map {
     features::drop_attributes(&map.map_geometries(as_points))
 }
 
-/// A rotation by any angle, scales of 0.5 to 2 along two axes, a shear, a mirror or none, a shift of up to 100 km.
+/// A rotation by any angle, scales of 0.5 to 2 along two axes, a shear, a mirror or none, a shift
+/// of up to 100 km.
 fn affine(random: &mut Random, about: [f64; 2]) -> [f64; 6] {
     let (sin, cos) = (std::f64::consts::PI * random.symmetric(1.0)).sin_cos();
     let (x_scale, y_scale) = (2f64.powf(random.symmetric(1.0)), 2f64.powf(random.symmetric(1.0)));

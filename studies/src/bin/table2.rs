@@ -1,4 +1,5 @@
-//! Marks maps, attacks the copies, verifies them, and compares the bit errors with the paper's Table 2.
+//! Marks maps, attacks the copies, verifies them, and compares the bit errors with the paper's
+//! Table 2.
 
 use clap::Parser;
 use meshmark_host_tests::{
@@ -72,7 +73,8 @@ fn run_all(arguments: Arguments) -> Result<()> {
     let product = product.with_options(arguments.option);
     let (quick, rows) = (arguments.quick, arguments.rows.clone());
     let wanted = move |case: &Case, profile: Profile| {
-        // The paper's two chip rates on its own rows; on all others the two codes at the same displacement.
+        // The paper's two chip rates on its own rows; on all others the two codes at the same
+        // displacement.
         let is_measured = case.table() == Table::Paper || (!quick && profile != Profile::repetition(3));
         is_measured && (rows.is_empty() || rows.contains(&case.id()))
     };

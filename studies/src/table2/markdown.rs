@@ -108,7 +108,8 @@ fn chip_rates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<usize> {
     distinct(outcomes.map(|o| o.profile.chip_rate))
 }
 
-/// The coded message beside the repeated one of the same displacement: on how many maps it came back whole.
+/// The coded message beside the repeated one of the same displacement: on how many maps it came
+/// back whole.
 fn whole_messages(plain: &[Outcome], coded: &[Outcome]) -> String {
     if coded.is_empty() {
         return String::new();

@@ -1,5 +1,6 @@
-//! Table 2 of R. Ohbuchi, H. Ueda and S. Endoh, *Watermarking 2D Vector Maps in the Mesh-Spectral Domain*,
-//! Shape Modeling International 2003: bit error rates in per cent, averages over the paper's own maps.
+//! Table 2 of R. Ohbuchi, H. Ueda and S. Endoh, *Watermarking 2D Vector Maps in the Mesh-Spectral
+//! Domain*, Shape Modeling International 2003: bit error rates in per cent, averages over the
+//! paper's own maps.
 
 /// The number of the attack, and the bit error rate at chip rates 2 and 3.
 pub const TABLE_2: [(&str, f64, f64); 21] = [

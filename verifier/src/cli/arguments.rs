@@ -25,21 +25,23 @@ pub(super) enum Subcommands {
         /// The file to write; it must not exist
         key_file: PathBuf,
     },
-    /// Say whether a suspect map carries a mark
+    /// Determine whether a suspect map carries a mark
     #[command(long_about = about_verify())]
     Verify(Box<VerifyArgs>),
-    /// Say what marking did to a map: displacement, angles, areas, topology
+    /// Measure the effect of marking on a map: displacement, angles, areas, topology
     ///
-    /// Features correspond by their order in each layer, vertices by their order in each feature. Exit codes: 0
-    /// compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too large, 7 an output cannot be written.
+    /// Features correspond by their order in each layer, vertices by their order in each feature.
+    /// Exit codes: 0 compared, 2 usage or maps that do not correspond, 5 unreadable input, 6 too
+    /// large, 7 an output cannot be written.
     Compare(CompareArgs),
     /// Write a marked copy of a map, and its record, for every recipient of a list
     ///
-    /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears when it is complete, was
-    /// read back and carries its message; the same command again skips those that are there. Exit codes: 0 all copies
-    /// are there, 2 usage, 5 unreadable map, 6 too large, 7 a copy cannot be written.
+    /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears
+    /// when it is complete, was read back and carries its message; the same command again skips
+    /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable map, 6 too
+    /// large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
-    /// Write man pages and shell completions, for those who make packages
+    /// Write man pages and shell completions, for packagers
     #[command(hide = true)]
     PackageFiles {
         /// The folder to write them to
@@ -58,7 +60,8 @@ pub(super) struct DistributeArgs {
     /// Folder for the copies and their records; made when it is not there
     #[arg(long, value_name = "FOLDER")]
     pub(super) output_dir: PathBuf,
-    /// Format of the copies, by GDAL's short name: GPKG, "ESRI Shapefile", FlatGeobuf, GeoJSON, GeoJSONSeq
+    /// Format of the copies, by GDAL's short name: GPKG, "ESRI Shapefile", FlatGeobuf, GeoJSON,
+    /// GeoJSONSeq
     #[arg(short, long, default_value = "GPKG")]
     pub(super) format: String,
     /// The map, unmarked; keep it, it is the reference of all copies
@@ -140,13 +143,13 @@ pub(super) struct VerifyArgs {
     /// Record the driver wrote when it marked the map
     #[arg(long, value_name = "FILE")]
     pub(super) record: Option<PathBuf>,
-    /// Folder of records (*.json): which of their recipients' copies is it?
+    /// Folder of records (*.json), to find the recipient of the copy
     #[arg(long, value_name = "FOLDER", conflicts_with = "record")]
     pub(super) records: Option<PathBuf>,
     /// The map in question
     pub(super) suspect: PathBuf,
-    /// Field of the reference to find landmarks by, matched with any field of the suspect by value; repeatable,
-    /// all string and integer fields by default
+    /// Field of the reference to find landmarks by, matched with any field of the suspect by value;
+    /// repeatable, all string and integer fields by default
     #[arg(long, value_name = "FIELD")]
     pub(super) landmark: Vec<String>,
     /// How to bring the suspect onto the reference
@@ -155,7 +158,8 @@ pub(super) struct VerifyArgs {
     /// How to demodulate
     #[arg(long, value_enum, default_value = "joint")]
     pub(super) demodulator: DemodulatorArg,
-    /// Radius within which vertices match, metres on the ground; by default it follows from the suspect
+    /// Radius within which vertices match, metres on the ground; by default it follows from the
+    /// suspect
     #[arg(long, value_name = "METRES", value_parser = positive, allow_negative_numbers = true)]
     pub(super) radius: Option<f64>,
     /// The verdict is match when the p-value is below this
@@ -164,10 +168,11 @@ pub(super) struct VerifyArgs {
     /// Print the report as one JSON object
     #[arg(long)]
     pub(super) json: bool,
-    /// Say in sentences what was compared, found and not tested
+    /// Describe in sentences what was compared, found and not tested
     #[arg(long, conflicts_with = "json")]
     pub(super) explain: bool,
-    /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with their scores
+    /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with
+    /// their scores
     #[arg(long, value_name = "FILE")]
     pub(super) evidence_map: Option<PathBuf>,
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
@@ -267,5 +272,5 @@ fn probability(text: &str) -> std::result::Result<f64, String> {
 
 fn about_verify() -> String {
     let codes = ExitCode::ALL.map(|code| format!("{} {}", code as u8, code.meaning())).join(", ");
-    format!("Say whether a suspect map carries a mark\n\nExit codes: {codes}.")
+    format!("Determine whether a suspect map carries a mark\n\nExit codes: {codes}.")
 }

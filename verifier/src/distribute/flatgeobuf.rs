@@ -7,7 +7,7 @@
 
 use crate::{Error, Result, inputs::gdal_failures};
 use gdal::{Dataset, vector::LayerAccess};
-use meshmark_dataset::{marking::Moves, workplace::file_error};
+use meshmark_dataset::{file_error, marking::Moves};
 use std::{fs, ops::Range, path::Path};
 
 /// The first bytes of a file of any version.

@@ -3,8 +3,8 @@
 
 use crate::{Error, Result};
 use meshmark_dataset::{
+    file_error,
     geojson_text::{self, Place, numbers, places},
-    workplace::file_error,
 };
 use std::{
     fs::File,

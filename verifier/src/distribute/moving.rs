@@ -7,9 +7,9 @@ use super::{
 };
 use crate::{Error, Result};
 use meshmark_dataset::{
+    file_error,
     geopackage::{self, Bounds},
     wkb::WkbError,
-    workplace::file_error,
 };
 use rusqlite::{Connection, OpenFlags, params};
 use std::{fs, path::Path};

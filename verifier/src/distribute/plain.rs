@@ -5,9 +5,9 @@
 use super::{flatgeobuf, geojson, moving, ogr2ogr, staged::Staged};
 use crate::{Error, Result};
 use meshmark_dataset::{
+    file_error,
     formats::Format,
     marking::{Moves, foreign_places},
-    workplace::file_error,
 };
 use std::{
     fs,

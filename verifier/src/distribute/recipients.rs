@@ -45,7 +45,8 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     if bytes.len() as u64 > LONGEST_LIST {
         return Err(bad(format!("is longer than {} MiB: split it", LONGEST_LIST >> 20)));
     }
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes); // the byte order mark of spreadsheets
+    // Spreadsheets write this byte order mark.
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
     let rows = rows(text).map_err(&bad)?;
     let column = match rows.first() {
         None => return Err(bad("is empty: write one recipient a line".into())),

@@ -13,12 +13,12 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError,
+    Error as MapError, file_error,
     formats::Format,
     marking::{self, Moves, Unmarked},
     publication::{Move, Publication},
     read_back::ReadBack,
-    workplace::{Workplace, file_error},
+    workplace::Workplace,
 };
 use std::{collections::BTreeSet, ffi::OsStr, fs, path::Path, sync::Mutex};
 

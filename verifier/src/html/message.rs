@@ -3,6 +3,7 @@
 use super::page::{count, figure, section, sentence};
 use crate::report::{Report, text::certainty};
 use maud::{Markup, html};
+use meshmark_core::message::Message;
 
 /// Number of bits in a row.
 const ROW: usize = 16;
@@ -47,8 +48,9 @@ fn decoded(report: &Report, message: &str) -> Markup {
 }
 
 fn bits(report: &Report) -> Markup {
-    let expected: Option<Vec<bool>> = report.expected_carried.as_deref().map(bits_of);
-    let read = bits_of(report.carried_message.as_deref().unwrap_or_default());
+    let message = |hex: &Option<String>| hex.as_deref().and_then(|hex| Message::from_hex(hex).ok());
+    let (expected, read) = (message(&report.expected_carried), message(&report.carried_message));
+    let read = read.as_ref().map_or(&[][..], Message::bits);
     let rows = report.bits.chunks(ROW).enumerate();
     html! {
         table.bits {
@@ -58,7 +60,7 @@ fn bits(report: &Report) -> Markup {
                     th scope="row" { (row * ROW) }
                     @for (column, llr) in llrs.iter().enumerate() {
                         @let bit = row * ROW + column;
-                        @let wrong = expected.as_ref().is_some_and(|e| e[bit] != read[bit]);
+                        @let wrong = expected.as_ref().is_some_and(|expected| expected.bits()[bit] != read[bit]);
                         td class=(format!("{}{}", class(*llr), if wrong { " wrong" } else { "" })) {
                             (if read[bit] { "1" } else { "0" })
                         }
@@ -86,10 +88,4 @@ fn legend(report: &Report) -> Markup {
             }
         }
     }
-}
-
-/// Returns the bits of hexadecimal digits, the most significant bit of each digit first.
-fn bits_of(hex: &str) -> Vec<bool> {
-    let digits = hex.chars().map(|c| c.to_digit(16).unwrap_or_default());
-    digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).collect()
 }

@@ -75,7 +75,7 @@ pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
 }
 
 pub(crate) const NOT_TESTED: [&str; 4] = [
-    "Who passed the map on: the mark says whose copy it was made from.",
+    "Who passed the map on: the mark identifies the copy it was made from.",
     "Attributes, styles and which features are there: the mark is in the coordinates alone.",
     "When the mark was made, and whether key and record are older than the suspect.",
     "Other keys and other references: the p-values hold for one key and one reference fixed beforehand.",

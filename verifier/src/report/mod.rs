@@ -41,7 +41,8 @@ pub struct Report {
     pub message: Option<String>,
     /// The decoded bits themselves, hexadecimal.
     pub carried_message: Option<String>,
-    /// The message that the key whitens to these bits, hexadecimal: that of a copy marked with MESSAGE.
+    /// The message that the key whitens to these bits, hexadecimal: that of a copy marked with
+    /// MESSAGE.
     pub unwhitened_message: Option<String>,
     /// Log-likelihood ratios of these bits after decoding, natural logarithm, positive = 1.
     pub bits: Vec<f64>,
@@ -55,8 +56,8 @@ pub struct Report {
     pub p_mark_log10: Option<f64>,
     /// log₁₀ of the p-value of this much agreement under `null_hypothesis`.
     pub p_recipient_log10: Option<f64>,
-    /// log₁₀ of the probability that this test misses a mark which the suspect carries, at least −6; null for a
-    /// match and where nothing was decided.
+    /// log₁₀ of the probability that this test misses a mark which the suspect carries, at least
+    /// −6; null for a match and where nothing was decided.
     pub p_missed_log10: Option<f64>,
     /// The content of a copy with another message; null when no message was expected.
     pub null_hypothesis: Option<Null>,

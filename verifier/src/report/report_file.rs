@@ -28,8 +28,8 @@ impl ReportFile {
     /// Checks, before the comparison starts, that the file can be written.
     ///
     /// # Errors
-    /// Fails on another extension than html and json, on a file that exists, and on a folder that is
-    /// missing or not writable.
+    /// Fails on another extension than html and json, on a file that exists, and on a folder that
+    /// is missing or not writable.
     pub fn new(path: &Path) -> Result<Self> {
         let refused = |reason: &str| Err(Error::ReportName { path: path.into(), reason: reason.into() });
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());

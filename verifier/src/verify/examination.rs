@@ -129,7 +129,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
     Ok(Fit::Fits(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
 }
 
-/// How a suspect is read: whole, and with all its attributes.
+/// A suspect is read whole, with all its attributes.
 const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
 
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
@@ -149,7 +149,8 @@ fn register(
     crs_search::register(&registrar, reference, suspect, file, request.registration)
 }
 
-/// Demodulates what matches, and measures what a present mark would show; nothing where matches are chance.
+/// Demodulates what matches, and measures what a present mark would show; nothing where matches are
+/// chance.
 fn demodulate(
     request: &Request,
     matched: &Matched,
@@ -164,7 +165,7 @@ fn demodulate(
     Ok(Some((found, power)))
 }
 
-/// What the suspect shows. `crs` is that of the reference.
+/// Returns the examination of a suspect that was matched. `crs` is that of the reference.
 fn seen(
     request: &Request,
     (matched, demodulated): (&Matched, Option<(Demodulated, Power)>),

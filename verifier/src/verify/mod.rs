@@ -27,8 +27,8 @@ use meshmark_detection::decision::{Decision, Expected};
 /// Verifies one suspect.
 ///
 /// # Errors
-/// Fails on unreadable input, on parameters that do not fit the reference, and on a record of another
-/// reference.
+/// Fails on unreadable input, on parameters that do not fit the reference, and on a record of
+/// another reference.
 pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
     let reference = read_reference(request, progress)?.or_fail()?;
     if let Some(record) = &request.record {

@@ -54,8 +54,9 @@ impl Row {
 /// The paper's unit, 10 cm, in metres: maps are in metres here.
 const UNIT: f64 = 0.1;
 
-/// The attacks of Table 2 (Ohbuchi, Ueda and Endoh 2003). Of 3a and 3b the text and the table say opposite
-/// factors; the table's are used. Figure 7 shows the crops, but the text does not say which is which.
+/// The attacks of Table 2 (Ohbuchi, Ueda and Endoh 2003). Of 3a and 3b the text and the table say
+/// opposite factors; the table's are used. Figure 7 shows the crops, but the text does not say
+/// which is which.
 pub fn paper_rows() -> Vec<Row> {
     use Attack::{Crop, InsertVertices, Linear, Noise, Scramble, Sequence, Snap, Translate};
     let round = Snap { spacing: UNIT };

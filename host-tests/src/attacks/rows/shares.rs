@@ -3,7 +3,8 @@
 use super::{Attack, Map, Row};
 use std::sync::Arc;
 
-/// Features deleted, exchanged for those of the map before marking, or left in one small place only.
+/// Features deleted, exchanged for those of the map before marking, or left in one small place
+/// only.
 pub fn rows(unmarked: &Arc<Map>) -> Vec<Row> {
     let share = |percent: i32| f64::from(percent) / 100.0;
     let deleted = [50, 80].map(|percent| {
