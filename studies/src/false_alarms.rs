@@ -19,13 +19,16 @@ use meshmark_detection::{
 };
 use meshmark_host_tests::{
     Result,
-    attacks::{Attack, Map, Random, noise, paper_rows},
+    attacks::{Attack, Map, OtherMaps, Random, extended_rows, noise, paper_rows},
     product::{Marking, Product, Profile, random_key},
 };
 use meshmark_verifier::{Request, progress::Progress, verify};
 use plotters::style::{BLACK, BLUE, RED};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 /// The grid of the maps, as in the paper's experiments.
 const PRECISION_M: f64 = 0.1;
@@ -43,11 +46,14 @@ pub struct Sample {
 
 /// A kind of suspect: its name, whether it is marked, and the row of Table 2 that it is put
 /// through.
-const SUSPECTS: [(&str, bool, Option<&str>); 6] = [
+const SUSPECTS: [(&str, bool, Option<&str>); 9] = [
     ("marked", true, None),
     ("marked, noise ±50 cm", true, Some("9c")),
     ("marked, middle 1/16", true, Some("10-8")),
     ("marked, local deformation", true, Some("6")),
+    ("marked, Gaussian noise of 0.7 m", true, Some("gauss0.7")),
+    ("marked, every building shifted by N(0, 1 m)", true, Some("shifted1")),
+    ("marked, resampled every 2 m", true, Some("resampled2")),
     ("unmarked, noise ±10 cm", false, Some("9a")),
     ("unmarked, local deformation", false, Some("6")),
 ];
@@ -90,7 +96,9 @@ pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<V
 }
 
 fn attack(row: Option<&str>) -> Attack {
-    let found = paper_rows().into_iter().find(|r| Some(r.id.as_str()) == row);
+    let nothing = Arc::new(Map { layers: Vec::new() });
+    let others = OtherMaps { foreign: nothing.clone(), unmarked: nothing };
+    let found = paper_rows().into_iter().chain(extended_rows(&others)).find(|r| Some(r.id.as_str()) == row);
     found.map_or(Attack::Sequence(Vec::new()), |row| row.attack)
 }
 
