@@ -72,7 +72,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    pub fn of(patches: &Patches, vertex: u32) -> Self {
+    pub fn new(patches: &Patches, vertex: u32) -> Self {
         Place { at_m: patches.positions_m()[vertex as usize], group: patches.group(vertex) }
     }
 }
@@ -155,7 +155,7 @@ impl Found {
             .filter(|(row, _)| !patch.hangs_elsewhere(*row))
             .filter_map(|(row, &v)| Some((row, observed[v as usize]?)))
             .unzip();
-        let at = rows.iter().map(|&row| Place::of(patches, patch.vertices[row])).collect();
+        let at = rows.iter().map(|&row| Place::new(patches, patch.vertices[row])).collect();
         Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
     }
 }

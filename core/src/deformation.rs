@@ -1,8 +1,8 @@
 //! The disturbance of the suspect besides the mark, estimated without the key: a smooth deformation
-//! (rubber sheeting, digitising, a wrong projection) and noise. The method is kriging of the
+//! (rubber sheeting, digitising, a wrong projection), shifts of polygon groups, and noise. The method is kriging of the
 //! displacements.
 //!
-//! The displacement of a vertex is deformation + mark + noise. The deformation is a Gaussian
+//! The displacement of a vertex is deformation + shift of its group + mark + noise. The deformation is a Gaussian
 //! process with a Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine
 //! Learning*, 2006, eq. 4.17) and a free shift of every patch. The estimate does not depend on the
 //! chips: it is the same for the tested key and for every decoy.
@@ -25,7 +25,7 @@ use rayon::prelude::*;
 /// found.
 pub type Observed = [Option<[f64; 2]>];
 
-/// No displacement is trusted to better than this, metres.
+/// Lower bound of the estimated noise, metres.
 pub(crate) const LEAST_NOISE_M: f64 = 0.01;
 /// Numbers of patches, and of vertices in each, from which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
@@ -211,7 +211,7 @@ impl Kriging {
         let total = |axis: usize| (0..self.found.rows.len()).map(|o| self.solved[(o, axis)]).sum::<f64>();
         let shift = [0, 1].map(|axis| SHIFT_M.powi(2) * total(axis));
         let anywhere = |v: u32| {
-            let here = Place::of(patches, v);
+            let here = Place::new(patches, v);
             self.found.at.iter().enumerate().fold(shift, |sum, (o, there)| {
                 let k = self.deformation.covariance(here.at_m, there.at_m)
                     + self.deformation.of_groups(here.group, there.group);

@@ -2,13 +2,14 @@
 
 use crate::{
     Error, Result,
-    carrier::{Carrier, bit_of_coefficient},
+    carrier::Carrier,
     deformation::{Deformation, LEAST_NOISE_M, Prediction},
     demodulation::joint_solved,
     distortion::{AngleChange, Corner, Displacement},
     key::SecretKey,
     map::Map,
     message::Message,
+    modulation::coefficients_m,
     nearness::VertexTree,
     options::{Parameters, Rigidity},
     patches::{Patch, Patches},
@@ -196,14 +197,11 @@ impl<'a> Embedding<'a> {
         [0, 1].map(|axis| self.carrier.chips(patch, axis, self.carriers))
     }
 
-    /// Returns the coefficients that modulate the message: 0 for the mean, then α p_i b′_j,
+    /// Returns the coefficients of the message: 0 for the mean, then those that modulate it,
     /// amplified by `gain`.
     fn coefficients(&self, chips: &[f64], signs: &[f64], gain: f64) -> Vec<f64> {
-        let chip_rate = self.parameters.chip_rate;
-        let modulated = chips.iter().enumerate().map(|(i, chip)| {
-            gain * self.parameters.amplitude_m * chip * signs[bit_of_coefficient(i + 1, chip_rate)]
-        });
-        std::iter::once(0.0).chain(modulated).collect()
+        let modulated = coefficients_m(chips, signs, self.parameters);
+        std::iter::once(0.0).chain(modulated.iter().map(|value| gain * value)).collect()
     }
 
     /// Reads the message back as the verifier does by default, from as many patches as it takes: by

@@ -11,12 +11,21 @@ use crate::{
 };
 use rayon::prelude::*;
 
+/// Returns the coefficients that modulate a message, metres: α p_i b′_j for every chip, where
+/// `signs` are the channel bits b′.
+pub(crate) fn coefficients_m(chips: &[f64], signs: &[f64], parameters: &Parameters) -> Vec<f64> {
+    let modulate = |(i, chip): (usize, &f64)| {
+        parameters.amplitude_m * chip * signs[bit_of_coefficient(i + 1, parameters.chip_rate)]
+    };
+    chips.iter().enumerate().map(modulate).collect()
+}
+
 /// Returns the displacement of every vertex in canonical order by a mark of full amplitude, metres:
 /// α p ∘ b′ on both axes of every patch. T-junctions and bodies follow as in [`crate::embedding`];
 /// tolerance, grid and the neighbourhood of a vertex are not considered.
 ///
 /// # Errors
-/// Those of [`Patches::carriers`], and a patch that cannot be solved.
+/// Returns the errors of [`Patches::carriers`], and fails when a patch cannot be solved.
 pub fn displacements_m(
     patches: &Patches,
     carrier: &Carrier,
@@ -25,14 +34,11 @@ pub fn displacements_m(
 ) -> Result<Vec<[f64; 2]>> {
     let carriers = patches.carriers(message.len(), parameters)?;
     let signs = parameters.code.encode(message);
-    let modulate = |(i, chip): (usize, f64)| {
-        parameters.amplitude_m * chip * signs[bit_of_coefficient(i + 1, parameters.chip_rate)]
-    };
     let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<[f64; 2]>> {
         let basis = Basis::low_frequencies(patch, carriers + 1)?;
         let coefficients = [0, 1].map(|axis| {
             let chips = carrier.chips(number, axis, carriers);
-            chips.into_iter().enumerate().map(modulate).collect::<Vec<f64>>()
+            coefficients_m(&chips, &signs, parameters)
         });
         Ok(Response::carriers(patch, &basis, parameters.shape).synthesise(&coefficients))
     };

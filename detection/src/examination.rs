@@ -4,7 +4,7 @@
 
 use crate::{
     decision::Decoys,
-    matching::{Matcher, Matches, Radius, RadiusChoice, is_chance, out_of_place},
+    matching::{Matcher, Matches, Radius, RadiusChoice, by_chance, is_chance},
     progress::{Listener, Progress},
     registration::Registration,
     tracking::{Followed, Tracking},
@@ -108,9 +108,7 @@ impl<'a> Matched<'a> {
         let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
         let radius = radius(&matcher, &moved, unit_m);
         let matches = matcher.all(&moved, radius.metres);
-        let [x, y] = out_of_place(unit_m, radius.metres);
-        let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
-        let by_chance = matcher.all(&shifted, radius.metres).count;
+        let by_chance = by_chance(&matcher, &moved, unit_m, radius.metres).0.count;
         Matched { reference, suspect, moved, radius, matches, by_chance }
     }
 

@@ -1,4 +1,4 @@
-//! Shifts of polygon groups: where a building went as a whole. No key is involved.
+//! Shifts of polygon groups: the shift of a building as a whole. No key is involved.
 //!
 //! Every pair of a group's vertex and a suspect vertex near it votes for the shift between them (a
 //! generalised Hough transform, Ballard 1981). A group that moved as a whole has one shift with the

@@ -1,6 +1,6 @@
 //! Power: whether a mark would show on this suspect.
 //!
-//! A trial mark, of a key that nobody has, is laid on the suspect as if the suspect were made from
+//! A trial mark under a derived key is applied to the suspect as if the suspect were made from
 //! a map with that mark: every vertex of the suspect moves as the nearest place on the linework of
 //! the reference does. Matching, tracking and demodulation are then repeated. The score of the
 //! trial mark thus includes what the suspect lost: displacements beyond the matching radius,
@@ -8,7 +8,7 @@
 //! and neither the tested key nor a message.
 
 use crate::{
-    decision::p_any_message_log10,
+    decision::{p_any_message_log10, shows_key},
     examination::{Demodulated, Demodulator, Mark, Matched, Reference},
     progress::Listener,
 };
@@ -23,8 +23,6 @@ use rstar::{
 };
 use sha2::{Digest, Sha256};
 
-/// A key shows whatever its message where the p-value for any message is below 10 to this power.
-const KEY_SHOWS_LOG10: f64 = -9.0;
 /// A place of the suspect farther than this from the linework of the reference is foreign to it,
 /// metres.
 const FOREIGN_M: f64 = 20.0;
@@ -34,7 +32,7 @@ const FOREIGN_M: f64 = 20.0;
 pub enum Power {
     /// No vertex moved, and a mark would have moved them.
     Unmoved,
-    /// The key shows, whatever its message: only the message is in question.
+    /// A mark of the key is detected, whatever its message: only the message is in question.
     KeyShows,
     /// A trial mark has this score on the suspect, standard deviations of the null hypothesis.
     Trial(f64),
@@ -55,8 +53,7 @@ impl Power {
         if seen.found.chip_correlations.iter().all(|a| *a == 0.0) {
             return Ok(Power::Unmoved);
         }
-        let p_any = p_any_message_log10(&seen.found, mark.parameters.chip_rate);
-        if p_any.is_some_and(|p| p < KEY_SHOWS_LOG10) {
+        if shows_key(p_any_message_log10(&seen.found, mark.parameters.chip_rate)) {
             return Ok(Power::KeyShows);
         }
         let key = trial_key(matched);

@@ -247,8 +247,7 @@ impl Lost {
             Lost::Unset(field) => format!("unset:{field}"),
             Lost::Real(field, value) => format!("real:{field}:{:x}", value.to_bits()),
             Lost::Text(field, bytes) => {
-                let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-                format!("text:{field}:{digits}")
+                format!("text:{field}:{}", meshmark_core::hex::encode(bytes))
             }
         }
     }

@@ -94,6 +94,14 @@ pub enum Error {
         path.display()
     )]
     OtherReference { path: PathBuf, recorded: usize, vertices: usize },
+    #[error(
+        "the record was made from none of the {references} references given: give the file that was marked, unchanged"
+    )]
+    NoReferenceOfRecord { references: usize },
+    #[error(
+        "there are several references, and no record to choose one by: give --record or --records, or one --reference"
+    )]
+    SeveralReferences,
 
     // --- inputs that cannot be read ---
     #[error("the {what} {} cannot be opened: {reason}{formats}", path.display())]
@@ -147,13 +155,36 @@ pub enum Error {
 }
 
 impl Error {
+    /// Returns whether the layers and the CRS that a request names allow no mark on a map.
+    pub fn is_about_options(&self) -> bool {
+        use meshmark_dataset::Error as Map;
+        matches!(
+            self,
+            Error::Dataset(
+                Map::NoLayers
+                    | Map::UnknownLayer { .. }
+                    | Map::MixedCrs { .. }
+                    | Map::NoCrs
+                    | Map::Geocentric(_)
+                    | Map::ContradictingSrs { .. }
+                    | Map::UnknownSrs(_)
+                    | Map::Reprojection { .. }
+                    | Map::TooSmall { .. }
+                    | Map::UnevenScale { .. }
+                    | Map::Core(_)
+            )
+        )
+    }
+
     /// Returns the exit code of this error.
     pub fn exit_code(&self) -> ExitCode {
         use Error::*;
         match self {
             Map { source, .. } => of_map_that_is_read(source),
-            Dataset(MapError::File { action: "writing", .. }) => ExitCode::Unwritable,
-            OtherKey { .. } | OtherMessage | OtherReference { .. } => ExitCode::DoesNotBelong,
+            Dataset(MapError::File { action, .. }) if *action != "reading" => ExitCode::Unwritable,
+            OtherKey { .. } | OtherMessage | OtherReference { .. } | NoReferenceOfRecord { .. } => {
+                ExitCode::DoesNotBelong
+            }
             Unopened { .. }
             | Unmeasured { .. }
             | Undigested { .. }

@@ -1,8 +1,11 @@
-//! Absence: whether a mark that does not show is not there. "No match" is a statement like "match"
+//! Absence: decides whether an undetected mark is absent. "No match" is a statement like "match"
 //! and has its own error rate: the probability that a mark which the suspect carries would be
 //! missed.
 
-use super::{MARK, Verdict, survival};
+use super::{
+    survival,
+    verdict::{MARK, Verdict},
+};
 use crate::power::Power;
 use meshmark_core::demodulation::Demodulation;
 
@@ -30,6 +33,8 @@ pub(super) struct Unmatched<'a> {
     pub bits: usize,
     /// The significance for each of the tried messages.
     pub each: f64,
+    /// The significance for all of them.
+    pub significance: f64,
     /// log₁₀ of the p-value of the message alone, and of all that were tried.
     pub p_log10: [f64; 2],
 }
@@ -66,7 +71,7 @@ impl Unmatched<'_> {
                 (least_root.powi(2) as usize + 1).next_multiple_of(4)
             ));
         }
-        if of_all < SUSPICIOUS_LOG10 || alone < self.each.log10() {
+        if of_all < SUSPICIOUS_LOG10 || alone < self.significance.log10() {
             return Some(
                 "the evidence for this mark is weak, but stronger than chance usually gives: a larger piece of the \
                  suspect, or the edition of the reference that was marked, would show more"

@@ -2,7 +2,7 @@
 //! null distribution; the decoys show that it holds for this suspect.
 
 use crate::histogram::Histogram;
-use meshmark_core::{demodulation::Demodulation, vertices::VertexTable};
+use meshmark_core::{demodulation::Demodulation, hex, vertices::VertexTable};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -42,7 +42,7 @@ impl Decoys {
         let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (COUNT - 1) as f64;
         Some(Decoys {
             count: COUNT,
-            seed: seed.iter().map(|byte| format!("{byte:02x}")).collect(),
+            seed: hex::encode(&seed),
             mean,
             standard_deviation: variance.sqrt(),
             largest: scores.iter().copied().fold(f64::NEG_INFINITY, f64::max),

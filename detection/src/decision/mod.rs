@@ -14,11 +14,15 @@
 //! one.
 
 mod absence;
+mod any_message;
 mod decoys;
 mod rivals;
 mod survival;
+mod verdict;
 
+pub use any_message::{p_any_message_log10, shows_key};
 pub use decoys::Decoys;
+pub use verdict::Verdict;
 
 use crate::power::Power;
 use absence::Unmatched;
@@ -64,21 +68,6 @@ impl Expected {
 /// The share of the largest possible recipient score, √n for n channel bits, that remains with
 /// unequal weights.
 const MOST_OF_ROOT: f64 = 0.99;
-
-/// The subject of a verdict; a change to any of these makes another mark.
-const MARK: &str = "a mark with this key, message, options and reference";
-
-/// The answer of a verification.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// The suspect carries this mark.
-    Match,
-    /// The suspect does not carry this mark, which would be detectable.
-    NoMatch,
-    /// The suspect does not allow an answer.
-    Inconclusive,
-}
 
 /// The answer and its grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,7 +171,7 @@ pub fn decide_among(
     } else {
         let alone = p_mark.max(p_recipient);
         let p_log10 = [alone, alone + (tried as f64).log10()];
-        let absence = Unmatched { found, power, bits, each, p_log10 }.decide();
+        let absence = Unmatched { found, power, bits, each, significance, p_log10 }.decide();
         p_missed_log10 = Some(absence.p_missed_log10);
         (absence.verdict, absence.reason)
     };
@@ -213,15 +202,6 @@ fn another_message(found: &Demodulation, each: f64) -> (Verdict, String) {
                 .into(),
         ),
     }
-}
-
-/// Returns log₁₀ of the probability of this much evidence for any message under a random key;
-/// `None` where no displacement was observed. Few chips may carry a bit, but the even moments of
-/// sums of random signs are at most those of normal variables, so Chernoff's bound on chi-squared
-/// holds for any number of chips.
-pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64> {
-    let (score, degrees) = found.key_score(chip_rate);
-    (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
 }
 
 #[cfg(test)]

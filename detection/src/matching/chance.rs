@@ -1,5 +1,7 @@
 //! Matches by chance: any two maps have some vertices within a radius of each other.
 
+use super::{matcher::Matcher, matches::Matches};
+
 /// Fewer matched vertices than this count as chance.
 pub const LEAST_MATCHED: usize = 30;
 /// Fewer than this many times the vertices that match out of place also count as chance.
@@ -17,4 +19,17 @@ pub fn is_chance(matched: usize, by_chance: usize) -> bool {
 /// along each axis.
 pub fn out_of_place(unit_m: [f64; 2], radius_m: f64) -> [f64; 2] {
     [0, 1].map(|axis| OUT_OF_PLACE[axis] * radius_m / unit_m[axis].max(f64::MIN_POSITIVE))
+}
+
+/// Returns the matches by chance: those of a suspect after a shift that moves any map out of place,
+/// and its shifted vertices. `unit_m` are the metres per unit along each axis.
+pub fn by_chance(
+    matcher: &Matcher,
+    moved: &[[f64; 2]],
+    unit_m: [f64; 2],
+    radius_m: f64,
+) -> (Matches, Vec<[f64; 2]>) {
+    let [x, y] = out_of_place(unit_m, radius_m);
+    let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
+    (matcher.all(&shifted, radius_m), shifted)
 }

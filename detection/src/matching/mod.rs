@@ -6,6 +6,7 @@ mod matcher;
 mod matches;
 mod radius;
 
+pub(crate) use chance::by_chance;
 pub use chance::{LEAST_MATCHED, is_chance, out_of_place};
 pub use joined::Graph;
 pub use matcher::{Matcher, Near};

@@ -1,7 +1,7 @@
 //! The matching radius, chosen from the distances of mutual nearest neighbours. No key is involved,
 //! so decoys have the same radius.
 
-use super::{chance::out_of_place, matcher::Matcher, matches::Matches};
+use super::{chance::by_chance, matcher::Matcher, matches::Matches};
 use serde::Serialize;
 
 /// The radii that are tried, metres. The first one is large enough for a mark and for the noise of
@@ -67,11 +67,10 @@ impl RadiusChoice {
 fn from_data(matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius {
     let largest_m = RADII_M[RADII_M.len() - 1];
     let found = counts(matcher, moved, &matcher.all(moved, largest_m));
-    let [x, y] = out_of_place(unit_m, largest_m);
-    let shifted: Vec<[f64; 2]> = moved.iter().map(|p| [p[0] + x, p[1] + y]).collect();
-    let by_chance = counts(matcher, &shifted, &matcher.all(&shifted, largest_m));
+    let (matches, shifted) = by_chance(matcher, moved, unit_m, largest_m);
+    let chance = counts(matcher, &shifted, &matches);
     let most = matcher.reference_count().min(moved.len()) as f64;
-    let within = |radius: usize| excess(found[radius], by_chance[radius], most);
+    let within = |radius: usize| excess(found[radius], chance[radius], most);
     let sensible = |radius: &usize| within(*radius) >= (1.0 - MOST_CHANCE) * found[*radius];
     let last = (0..RADII_M.len()).rev().find(sensible).unwrap_or(0);
     let first = (0..=last).find(|&radius| within(radius) >= ENOUGH * within(last)).unwrap_or(0);

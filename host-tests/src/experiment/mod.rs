@@ -86,7 +86,7 @@ pub fn is_match(outcome: &Outcome) -> bool {
 }
 
 /// A copy of a map.
-struct Copy {
+struct MarkedCopy {
     recipient: String,
     path: PathBuf,
     record: PathBuf,
@@ -97,7 +97,7 @@ struct Sheet {
     name: String,
     profile: Profile,
     reference: PathBuf,
-    copies: Vec<Copy>,
+    copies: Vec<MarkedCopy>,
 }
 
 /// The number of a sheet, and what to do with it.
@@ -198,13 +198,13 @@ impl Lab<'_> {
         Ok((sheets, jobs))
     }
 
-    fn mark(&self, sheet: &str, reference: &Path, profile: Profile, copy: usize) -> Result<Copy> {
+    fn mark(&self, sheet: &str, reference: &Path, profile: Profile, copy: usize) -> Result<MarkedCopy> {
         let recipient = format!("recipient {copy}");
         let path = self.folder.join(format!("{sheet}-copy{copy}.gpkg"));
         let record = path.with_extension("json");
         let marking = Marking { key: &self.key(), recipient: &recipient, profile, precision: PRECISION_M };
         self.product.mark(reference, &path, &record, marking)?;
-        Ok(Copy { recipient, path, record })
+        Ok(MarkedCopy { recipient, path, record })
     }
 
     /// Makes the suspect of a case and asks about everybody; nobody when the attack leaves nothing.
@@ -228,7 +228,8 @@ impl Lab<'_> {
     }
 
     fn make_suspect(&self, sheet: &Sheet, case: &Case, seed: u64, suspect: &Path) -> Result<Vec<Question>> {
-        let guilty = |copy: &Copy| self.question(sheet, &copy.recipient, true, Some(copy.record.clone()));
+        let guilty =
+            |copy: &MarkedCopy| self.question(sheet, &copy.recipient, true, Some(copy.record.clone()));
         let [first, ..] = sheet.copies.as_slice() else { unreachable!("a sheet has a copy") };
         match case {
             Case::Attacked { row, .. } => {

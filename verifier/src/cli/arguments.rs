@@ -137,9 +137,9 @@ pub(super) struct VerifyArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
     pub(super) key: PathBuf,
-    /// The map as it was before marking
-    #[arg(long, value_name = "MAP")]
-    pub(super) reference: PathBuf,
+    /// The map as it was before marking; several, such as editions, where records choose among them
+    #[arg(long, value_name = "MAP", required = true)]
+    pub(super) reference: Vec<PathBuf>,
     /// Record the driver wrote when it marked the map
     #[arg(long, value_name = "FILE")]
     pub(super) record: Option<PathBuf>,

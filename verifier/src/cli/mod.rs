@@ -14,7 +14,9 @@ use meshmark_verifier::{
     inputs::{digests::Inputs, gdal_failures, texts},
     progress::Progress,
     report::{self, EvidenceMapFile, Format, Provenance, Report, ReportFile},
-    verify, verify_records,
+    verify,
+    verify::with_reference_of_record,
+    verify_records,
     words::printable,
 };
 use request::request;
@@ -134,21 +136,29 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     let wanted = args.explain || file.is_some();
-    let inputs = wanted.then(|| Inputs::read(&args.key, &args.reference, &args.suspect)).transpose()?;
+    let (key, references, suspect) = (args.key.clone(), args.reference.clone(), args.suspect.clone());
+    let digest = |reference: &Path| Inputs::read(&key, reference, &suspect);
+    let inputs = match references.as_slice() {
+        [one] if wanted => Some(digest(one)?), // as they are before the verification
+        _ => None,
+    };
     let (json, explain) = (args.json, args.explain);
     let (records, record) = (args.records.clone(), args.record.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut report = match &records {
-        Some(folder) => verify_records(&request, folder, &mut progress, &mut warn)?,
-        None => verify(&request, &mut progress)?,
+        Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,
+        None => verify(&with_reference_of_record(&request, &references, &mut progress)?, &mut progress)?,
     };
     if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
         map.write(&target)?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
     print(&if json { report.to_json() } else { report.to_text() })?;
-    let Some(inputs) = inputs else { return Ok(report.exit_code()) };
+    if !wanted {
+        return Ok(report.exit_code());
+    }
+    let inputs = inputs.map_or_else(|| digest(&report.reference), Ok)?;
     let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
     let inputs = inputs.with_record(record.or_else(best).as_deref())?;
     if explain {

@@ -27,7 +27,7 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         bits: options.subject.as_ref().map_or(RECIPIENT_BITS, |subject| subject.message(&key).len()),
         subject: options.subject,
         key,
-        reference: args.reference,
+        reference: args.reference.into_iter().next().expect("one is required"),
         suspect: args.suspect,
         record,
         parameters: options.parameters,

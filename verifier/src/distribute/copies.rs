@@ -117,7 +117,7 @@ fn stem(recipient: &str) -> String {
         }
     }
     let slug: String = slug.chars().take(LONGEST_SLUG).collect();
-    let hash: String = Sha256::digest(recipient)[..4].iter().map(|byte| format!("{byte:02x}")).collect();
+    let hash = meshmark_core::hex::encode(&Sha256::digest(recipient)[..4]);
     match slug.trim_end_matches('-') {
         "" => hash,
         slug => format!("{slug}-{hash}"),

@@ -25,7 +25,7 @@ use meshmark_detection::{
     registration::Registration,
 };
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::PathBuf};
 
 /// The result of one verification. docs/report.schema.json describes its JSON.
 #[derive(Debug, Clone, Serialize)]
@@ -85,6 +85,9 @@ pub struct Report {
     /// The expected message as the code carries it, hexadecimal.
     #[serde(skip)]
     pub expected_carried: Option<String>,
+    /// The reference, the one of the best record.
+    #[serde(skip)]
+    pub reference: PathBuf,
     /// Digest of the vertices of the reference.
     #[serde(skip)]
     pub reference_digest: String,

@@ -3,7 +3,10 @@
 use super::Report;
 use crate::words::power_of_ten;
 use meshmark_core::code::Decoder;
-use meshmark_detection::{decision::Verdict, matching::RadiusReason};
+use meshmark_detection::{
+    decision::{Verdict, shows_key},
+    matching::RadiusReason,
+};
 
 impl Report {
     /// Returns a short text.
@@ -102,7 +105,7 @@ impl Report {
 
     /// Returns whether the suspect carries some mark of the key, whatever its message.
     pub(crate) fn shows_key(&self) -> bool {
-        self.p_any_message_log10.is_some_and(|p| p < self.parameters.significance.log10())
+        shows_key(self.p_any_message_log10)
     }
 
     pub(crate) fn verdict_name(&self) -> &'static str {

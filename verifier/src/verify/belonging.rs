@@ -1,6 +1,6 @@
 //! Checks that a record belongs to a key and a reference.
 
-use super::request::Request;
+use super::{references::is_made_from, request::Request};
 use crate::{Error, Result};
 use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_dataset::Survey;
@@ -25,7 +25,7 @@ pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
 /// # Errors
 /// Fails when the record is of another reference.
 pub fn check_reference(record: &Record, request: &Request, reference: &Survey, digest: &str) -> Result<()> {
-    if record.reference.vertices_sha256 == digest {
+    if is_made_from(record, digest) {
         return Ok(());
     }
     Err(Error::OtherReference {

@@ -64,6 +64,7 @@ pub fn conclude(
         seconds: Some(seconds.clone()),
         provenance: None,
         evidence: sketch.map(|sketch| Evidence { patch_scores: patch_scores(sketch.patches.len()), sketch }),
+        reference: request.reference.clone(),
         reference_digest: seen.reference_digest.clone(),
         suspect_crs: seen.suspect_crs.clone(),
         evidence_map: evidence_map.map(|map| {

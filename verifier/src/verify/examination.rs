@@ -5,7 +5,7 @@ use super::{
     request::Request,
 };
 use crate::{
-    Error, ExitCode, Result,
+    Error, Result,
     inputs::{
         maps::{self, Reading},
         suspects::{self, Suspect},
@@ -62,7 +62,7 @@ pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Fit<
     let reading = Reading { layers, srs, landmarks: request.landmarks(), geometries: false };
     match maps::reference(&request.reference, &reading) {
         Ok(reference) => Ok(Fit::Fits(reference)),
-        Err(error) if error.exit_code() == ExitCode::Usage => Ok(Fit::Unfit(error)),
+        Err(error) if error.is_about_options() => Ok(Fit::Unfit(error)),
         Err(error) => Err(error),
     }
 }

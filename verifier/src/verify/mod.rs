@@ -12,11 +12,13 @@ mod conclusion;
 mod crs_search;
 mod examination;
 mod records;
+mod references;
 mod request;
 
 pub use belonging::{check_key, check_reference};
 pub use examination::{Examination, Fit, examine, read_reference};
 pub use records::verify_records;
+pub use references::with_reference_of_record;
 pub use request::Request;
 
 use crate::{Result, progress::Progress, report::Report};

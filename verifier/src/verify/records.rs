@@ -4,9 +4,10 @@
 //! registered, matched and demodulated once for all of them.
 
 use super::{
-    belonging::{check_key, check_reference},
+    belonging::check_key,
     conclusion::conclude,
     examination::{Examination, Fit, examine, read_reference},
+    references::is_made_from,
     request::Request,
 };
 use crate::{
@@ -19,7 +20,7 @@ use meshmark_core::{
     demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
 };
 use meshmark_detection::decision::{Decision, Expected, Verdict};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Number of the best records in the list, which also holds every match.
 const MOST_LISTED: usize = 20;
@@ -47,14 +48,16 @@ struct Outcome {
     bit_errors: Option<usize>,
 }
 
-/// Verifies one suspect against every record (*.json) of a folder. `request` holds the other
-/// settings; its mark is replaced by that of each record. `warn` receives the skipped files with
+/// Verifies one suspect against every record (*.json) of a folder, each with the one of `references`
+/// from which it was made. `request` holds the other settings; its mark and reference are replaced
+/// by those of each record. `warn` receives the skipped files with
 /// the reasons.
 ///
 /// # Errors
 /// Fails like [`crate::verify()`], and when no record is usable.
 pub fn verify_records(
     request: &Request,
+    references: &[PathBuf],
     folder: &Path,
     progress: &mut Progress,
     warn: &mut dyn FnMut(&str),
@@ -68,9 +71,10 @@ pub fn verify_records(
     let mut examined: Vec<(Request, Examination)> = Vec::new();
     let mut of_group = Vec::new();
     for group in groups {
-        let Some((group, seen)) = examine_group(group, progress, &mut skip)? else { continue };
-        of_group.push(group.candidates);
-        examined.push((group.request, seen));
+        for (group, seen) in examine_group(group, references, progress, &mut skip)? {
+            of_group.push(group.candidates);
+            examined.push((group.request, seen));
+        }
     }
     let left_out = skipped.iter().map(|(_, files)| files.len()).sum();
     for (reason, files) in &skipped {
@@ -154,38 +158,54 @@ fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
     groups
 }
 
-/// Demodulates the suspect for one group; returns `None` when none of its records is of this
-/// reference.
+/// Demodulates the suspect for the records of a group, for each reference those that were made from
+/// it. Records of no reference are skipped.
 fn examine_group(
     mut group: Group,
+    references: &[PathBuf],
     progress: &mut Progress,
     skip: &mut dyn FnMut(&str, String),
-) -> Result<Option<(Group, Examination)>> {
-    let reference = match read_reference(&group.request, progress)? {
-        Fit::Fits(reference) => reference,
-        Fit::Unfit(error) => return Ok(skip_all(&group, &error, skip)),
-    };
-    let digest = reference.data.vertices.digest();
-    group.candidates.retain(|candidate| {
-        let checked = check_reference(&candidate.record, &group.request, &reference, &digest);
-        if let Err(error) = &checked {
-            skip(&candidate.file, error.to_string());
+) -> Result<Vec<(Group, Examination)>> {
+    let mut examined = Vec::new();
+    let mut other = None;
+    for path in references {
+        let request = Request { reference: path.clone(), ..group.request.clone() };
+        let reference = match read_reference(&request, progress)? {
+            Fit::Fits(reference) => reference,
+            Fit::Unfit(error) => {
+                other = Some(error.to_string());
+                continue;
+            }
+        };
+        let digest = reference.data.vertices.digest();
+        let (own, rest) = group.candidates.into_iter().partition(|c| is_made_from(&c.record, &digest));
+        group.candidates = rest;
+        let own = Group { request, candidates: own };
+        if own.candidates.is_empty() {
+            continue;
         }
-        checked.is_ok()
-    });
-    if group.candidates.is_empty() {
-        return Ok(None);
+        match examine(&own.request, &reference, progress)? {
+            Fit::Fits(seen) => examined.push((own, seen)),
+            Fit::Unfit(error) => skip_all(&own, &error.to_string(), skip),
+        }
     }
-    match examine(&group.request, &reference, progress)? {
-        Fit::Fits(seen) => Ok(Some((group, seen))),
-        Fit::Unfit(error) => Ok(skip_all(&group, &error, skip)),
-    }
+    let reason = match (references, other) {
+        ([_], Some(unfit)) => unfit,
+        ([one], None) => {
+            format!("made from another reference than {}: give its file, too, unchanged", one.display())
+        }
+        _ => format!(
+            "made from none of the {} references given: give their files, too, unchanged",
+            references.len()
+        ),
+    };
+    skip_all(&group, &reason, skip);
+    Ok(examined)
 }
 
-/// Skips a whole group, as settings that do not fit the reference are a fault of the records.
-fn skip_all<T>(group: &Group, error: &Error, skip: &mut dyn FnMut(&str, String)) -> Option<T> {
-    group.candidates.iter().for_each(|candidate| skip(&candidate.file, error.to_string()));
-    None
+/// Skips all records of a group.
+fn skip_all(group: &Group, reason: &str, skip: &mut dyn FnMut(&str, String)) {
+    group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.into()));
 }
 
 /// Decides on every candidate; the best one comes first.

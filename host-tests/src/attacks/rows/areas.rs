@@ -1,6 +1,7 @@
 //! Rows in which something else stands for polygons and lines.
 
-use super::{Attack, Row};
+use super::row::Row;
+use crate::attacks::Attack;
 use crate::attacks::{
     buffers::{Buffering, Join},
     outlines::Outline,

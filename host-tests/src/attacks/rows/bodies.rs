@@ -1,6 +1,7 @@
 //! Rows in which vertices move together: buildings, features, a whole sheet.
 
-use super::{Attack, Row};
+use super::row::Row;
+use crate::attacks::Attack;
 use crate::attacks::bodies::Motion;
 
 /// Buildings shifted and turned, sheets bent, features redrawn.

@@ -1,6 +1,7 @@
 //! Rows that keep the course of lines and rings, but not their vertices.
 
-use super::{Attack, Row};
+use super::row::Row;
+use crate::attacks::Attack;
 use crate::attacks::{
     curves::Redrawing,
     similarity::{About, rotation},

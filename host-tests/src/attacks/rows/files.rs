@@ -1,6 +1,7 @@
 //! Rows about what formats and media do to coordinates and attributes.
 
-use super::{Attack, Row};
+use super::row::Row;
+use crate::attacks::Attack;
 use crate::attacks::{
     Map,
     formats::Format,

@@ -1,6 +1,7 @@
 //! Rows about which features of a map are left.
 
-use super::{Attack, Map, Row};
+use super::row::Row;
+use crate::attacks::{Attack, Map};
 use std::sync::Arc;
 
 /// Features deleted, exchanged for those of the map before marking, or left in one small place
