@@ -5,6 +5,7 @@
 use crate::{
     decision::Decoys,
     matching::{Matcher, Matches, Radius, RadiusChoice, is_chance, out_of_place},
+    observations::{self, Observations},
     progress::{Listener, Progress},
     registration::Registration,
     tracking::{Followed, Tracking},
@@ -12,7 +13,7 @@ use crate::{
 use meshmark_core::{
     Result,
     carrier::Carrier,
-    deformation::Deformation,
+    deformation::{Deformation, Prediction},
     demodulation::{self, Demodulation},
     ground::Ground,
     key::SecretKey,
@@ -111,8 +112,15 @@ impl<'a> Matched<'a> {
         Matched { reference, suspect, moved, radius, matches, by_chance }
     }
 
-    /// Returns whether no more vertices match than by chance; demodulation is impossible then.
-    pub fn is_chance(&self) -> bool {
+    /// Returns whether no more vertices match than by chance, and, for the joint demodulator, lines show no more
+    /// corners than by chance; demodulation is impossible then.
+    pub fn is_chance(&self, demodulator: Demodulator) -> bool {
+        let is_read_by_corners = || demodulator == Demodulator::Joint && observations::corners_show(self);
+        self.is_chance_of_vertices() && !is_read_by_corners()
+    }
+
+    /// Returns whether no more vertices match than by chance.
+    pub(crate) fn is_chance_of_vertices(&self) -> bool {
         is_chance(self.matches.count, self.by_chance)
     }
 
@@ -127,6 +135,17 @@ impl<'a> Matched<'a> {
         demodulator: Demodulator,
         listener: Listener,
     ) -> Result<Demodulated> {
+        self.demodulate_on(None, mark, demodulator, listener)
+    }
+
+    /// Demodulates on `given` observations, or on those with more information.
+    pub(crate) fn demodulate_on(
+        &self,
+        given: Option<Observations>,
+        mark: Mark,
+        demodulator: Demodulator,
+        listener: Listener,
+    ) -> Result<Demodulated> {
         let Mark { key, bits, parameters } = mark;
         let (patches, carrier) = (&self.reference.patches, Carrier::new(key));
         let (stage, steps) = ("demodulation", patches.as_slice().len() as u64);
@@ -137,16 +156,19 @@ impl<'a> Matched<'a> {
             let observed = self.matches.displacements_m(coords, &self.moved, ground);
             let found = demodulation::paper(patches, &carrier, &observed, bits, parameters, &step)?;
             let weights = vec![1.0; observed.len()];
-            return Ok(self.demodulated(found, self.matches.clone(), None, weights));
+            return Ok(self.demodulated(found, self.matches.clone(), None, weights, Observations::Vertices));
         }
         listener(Progress::Stage { stage: "deformation", steps: 0 });
         let maps = (self.reference.data, self.suspect);
         let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
-        let Followed { matches, observed, disturbance } =
-            tracking.follow(self.reference.carriers, parameters, self.radius.metres)?;
+        let carriers = self.reference.carriers;
+        let followed = tracking.follow(carriers, parameters, self.radius.metres)?;
+        let (followed, observations) = observations::choose(self, followed, carriers, parameters, given)?;
+        let Followed { matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });
         let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
-        Ok(self.demodulated(found, matches, Some(disturbance.deformation), disturbance.weights))
+        let Prediction { deformation, weights, .. } = disturbance;
+        Ok(self.demodulated(found, matches, Some(deformation), weights, observations))
     }
 
     fn demodulated(
@@ -155,9 +177,10 @@ impl<'a> Matched<'a> {
         matches: Matches,
         deformation: Option<Deformation>,
         weights: Vec<f64>,
+        observations: Observations,
     ) -> Demodulated {
         let decoys = Decoys::new(&found, &self.suspect.vertices, &self.reference.data.vertices);
-        Demodulated { found, matches, deformation, weights, decoys }
+        Demodulated { found, matches, deformation, weights, observations, decoys }
     }
 }
 
@@ -172,6 +195,8 @@ pub struct Demodulated {
     /// The weight of every reference vertex: 1, or less where its displacement disagrees with the
     /// others.
     pub weights: Vec<f64>,
+    /// What the displacements were observed on.
+    pub observations: Observations,
     /// Scores of decoy keys; none where no vertex moved.
     pub decoys: Option<Decoys>,
 }

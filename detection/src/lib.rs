@@ -49,10 +49,14 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod corners;
 pub mod decision;
+mod edges;
 mod examination;
 mod histogram;
+mod linework;
 pub mod matching;
+mod observations;
 pub mod power;
 mod progress;
 pub mod registration;
@@ -60,4 +64,5 @@ mod tracking;
 
 pub use examination::{Demodulated, Demodulator, Mark, Matched, Reference};
 pub use histogram::{Histogram, round_up};
+pub use observations::Observations;
 pub use progress::{Listener, Progress};
