@@ -33,12 +33,14 @@ const QUIET_M: f64 = 0.1;
 const MOST_FOUND: f64 = 0.7;
 /// Information beyond this accuracy counts no more, metres.
 const LEAST_NOISE_M: f64 = 0.03;
-/// Corners must have this many times the information of the vertices where most vertices lie at the corners.
-const CLEARLY: f64 = 1.5;
-/// Elsewhere vertices are new: those matched are so by chance, and their information seems more than it is.
-const NEARLY: f64 = 0.5;
-/// A vertex within this distance of a corner is that corner, metres.
+/// A matched vertex within this distance of the corner is that corner, metres.
 const SAME_M: f64 = 0.1;
+/// The matched vertices are new where no more than this share of them are corners.
+const MOST_NEW: f64 = 1.0 / 3.0;
+/// Corners must have this many times the information of vertices that are corners.
+const CLEARLY: f64 = 1.2;
+/// New vertices match by their nearness alone, and their information seems more than it is.
+const NEARLY: f64 = 0.5;
 /// A deformation that changes over less than this many metres hides a mark like noise.
 const SMOOTH_M: f64 = 20.0;
 /// Fewer than this many times the corners found out of place are chance.
@@ -109,7 +111,7 @@ fn needed(matched: &Matched, displaced: &Observed, corners: &Observed) -> f64 {
     };
     let gaps: Vec<f64> = displaced.iter().zip(corners).filter_map(gap).collect();
     let same = gaps.iter().filter(|gap| **gap < SAME_M).count();
-    if 2 * same > gaps.len() { CLEARLY } else { NEARLY }
+    if same as f64 > MOST_NEW * gaps.len() as f64 { CLEARLY } else { NEARLY }
 }
 
 /// Returns the displacements of the matched vertices as they are, metres.
