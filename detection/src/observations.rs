@@ -29,6 +29,8 @@ pub enum Observations {
 const REACH_M: f64 = 1.5;
 /// Noise below this is explained by the vertices themselves, metres; corners cannot do better by far.
 const QUIET_M: f64 = 0.1;
+/// The size of a house, metres.
+const HOUSE_M: f64 = 10.0;
 /// Vertices of which more than this share is found need no corners, while their noise is quiet.
 const MOST_FOUND: f64 = 0.7;
 /// Information beyond this accuracy counts no more, metres.
@@ -61,7 +63,7 @@ pub fn choose(
 ) -> Result<(Followed, Observations)> {
     let is_plain = match given {
         Some(kind) => kind == Observations::Vertices,
-        None => followed.disturbance.deformation.noise_m < QUIET_M && is_mostly_found(matched, &followed),
+        None => is_quiet(&followed.disturbance.deformation) && is_mostly_found(matched, &followed),
     };
     if is_plain {
         return Ok((followed, Observations::Vertices));
@@ -161,6 +163,11 @@ fn information(observed: &Observed, disturbance: &Prediction) -> f64 {
     count / (rest2 + rough2).max(LEAST_NOISE_M.powi(2))
 }
 
+/// Returns whether a disturbance leaves little to explain. One that changes from house to house explains nothing.
+fn is_quiet(Deformation { deviation_m, range_m, noise_m }: &Deformation) -> bool {
+    *noise_m < QUIET_M && (*deviation_m < QUIET_M || *range_m > HOUSE_M)
+}
+
 /// Returns whether most reference vertices in the extent of the suspect were found.
 fn is_mostly_found(matched: &Matched, followed: &Followed) -> bool {
     let mut extent = AABB::new_empty();
@@ -169,4 +176,92 @@ fn is_mostly_found(matched: &Matched, followed: &Followed) -> bool {
     let there = coords.iter().filter(|place| extent.contains_point(place)).count();
     let found = followed.observed.iter().flatten().count();
     found as f64 >= MOST_FOUND * there as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Demodulator, Mark, Reference, matching::RadiusChoice, registration::Registrar, registration::Start,
+    };
+    use meshmark_core::{
+        embedding,
+        ground::Ground,
+        key::SecretKey,
+        map_data::{ChainKind, MapData},
+        message::Message,
+    };
+
+    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
+    /// The corners of a house; the last one is the first one.
+    const HOUSE: [[f64; 2]; 5] = [[0.0, 0.0], [14.0, 0.0], [14.0, 9.0], [0.0, 9.0], [0.0, 0.0]];
+
+    fn rings(coords: Vec<[f64; 2]>, vertices: usize) -> (MapData, Vec<u32>) {
+        let starts: Vec<u32> = (0..coords.len() as u32).step_by(vertices).collect();
+        let kinds = vec![ChainKind::Shell; starts.len()];
+        MapData::from_chains(coords, &starts, kinds).unwrap()
+    }
+
+    /// 400 houses, 25 m apart, unevenly placed.
+    fn town() -> (MapData, Vec<u32>) {
+        let house = |i: usize| [(i % 20 * 25 + i % 7) as f64, (i / 20 * 25 + i % 3) as f64];
+        let coords = (0..400).flat_map(|i| HOUSE.map(|[x, y]| [x + house(i)[0], y + house(i)[1]]));
+        rings(coords.collect(), HOUSE.len())
+    }
+
+    /// Returns the score of a mark on what `alter` makes of the corners of a marked town, and what it was read from.
+    fn read(alter: impl Fn(Vec<[f64; 2]>) -> MapData) -> (f64, Observations) {
+        let (town, indices) = town();
+        let map = town.on(METRES, None);
+        let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::default());
+        let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
+        let copy = embedding::embed(&map, &key, &message, &parameters).unwrap();
+        let suspect = alter(indices.iter().map(|&vertex| copy.coords[vertex as usize]).collect());
+        let reference = Reference::new(&town, &map, 128, &parameters).unwrap();
+        let registration = Registrar::new(&town, &METRES, 1.0).register(&suspect, Start::None);
+        let matched = Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData);
+        assert!(!matched.is_chance(Demodulator::Joint));
+        let mark = Mark { key: &key, bits: 128, parameters: &parameters };
+        let found = matched.demodulate(mark, Demodulator::Joint, &|_| ()).unwrap();
+        (found.found.mark_score(&message), found.observations)
+    }
+
+    fn between([a, b]: [[f64; 2]; 2], share: f64) -> [f64; 2] {
+        [0, 1].map(|axis| a[axis] + share * (b[axis] - a[axis]))
+    }
+
+    #[test]
+    fn lines_with_new_vertices_are_read_by_their_corners() {
+        for shares in [[0.15, 0.6], [0.35, 0.8]] {
+            let (score, observations) = read(|corners| {
+                let sides = corners.chunks(HOUSE.len()).flat_map(|ring| {
+                    let sides = ring.windows(2).map(|ends| [ends[0], ends[1]]);
+                    let mut places: Vec<_> =
+                        sides.flat_map(|side| shares.map(|share| between(side, share))).collect();
+                    places.push(places[0]);
+                    places
+                });
+                rings(sides.collect(), 2 * (HOUSE.len() - 1) + 1).0
+            });
+            assert_eq!(observations, Observations::Corners, "{shares:?}");
+            assert!(score > 15.0, "{score}, {shares:?}");
+        }
+    }
+
+    #[test]
+    fn old_vertices_are_read_themselves_whether_exact_or_noisy() {
+        for noise_m in [0.0, 0.8] {
+            let noise = |i: usize| noise_m * ((i * 7919 % 1009) as f64 / 504.0 - 1.0);
+            let (score, observations) = read(|corners| {
+                // The last corner of a ring is the first one.
+                let vertex =
+                    |i: usize| if i % HOUSE.len() == HOUSE.len() - 1 { i + 1 - HOUSE.len() } else { i };
+                let each = corners.iter().enumerate().map(|(i, p)| (vertex(i), p));
+                let noisy = each.map(|(i, p)| [p[0] + noise(2 * i), p[1] + noise(2 * i + 1)]);
+                rings(noisy.collect(), HOUSE.len()).0
+            });
+            assert_eq!(observations, Observations::Vertices, "{noise_m} m");
+            assert!(score > 5.0, "{score}, {noise_m} m");
+        }
+    }
 }
