@@ -1,11 +1,11 @@
 //! The disturbance of the suspect besides the mark, estimated without the key: a smooth deformation
-//! (rubber sheeting, digitising, a wrong projection), shifts of polygon groups, and noise. The method is kriging of the
-//! displacements.
+//! (rubber sheeting, digitising, a wrong projection), shifts of polygon groups, and noise. The
+//! method is kriging of the displacements.
 //!
-//! The displacement of a vertex is deformation + shift of its group + mark + noise. The deformation is a Gaussian
-//! process with a Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes for Machine
-//! Learning*, 2006, eq. 4.17) and a free shift of every patch. The estimate does not depend on the
-//! chips: it is the same for the tested key and for every decoy.
+//! The displacement of a vertex is deformation + shift of its group + mark + noise. The deformation
+//! is a Gaussian process with a Matérn 5/2 covariance (Rasmussen and Williams, *Gaussian Processes
+//! for Machine Learning*, 2006, eq. 4.17) and a free shift of every patch. The estimate does not
+//! depend on the chips: it is the same for the tested key and for every decoy.
 
 pub use crate::covariance::Deformation;
 

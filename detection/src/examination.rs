@@ -1,25 +1,22 @@
-//! An examination as a sequence of values: a [`Reference`] and a registered suspect form a
+//! An examination as a sequence of values: a [`crate::Reference`] and a registered suspect form a
 //! [`Matched`] pair, which becomes [`Demodulated`] evidence; module [`crate::decision`] decides on
 //! it.
 
 use crate::{
     decision::Decoys,
-    matching::{Matcher, Matches, Radius, RadiusChoice, by_chance, is_chance},
+    matched::Matched,
+    matching::{Matches, Radius},
+    observations::{self, Observations},
     progress::{Listener, Progress},
-    registration::Registration,
     tracking::{Followed, Tracking},
 };
 use meshmark_core::{
     Result,
     carrier::Carrier,
-    deformation::Deformation,
+    deformation::{Deformation, Prediction},
     demodulation::{self, Demodulation},
-    ground::Ground,
     key::SecretKey,
-    map::Map,
-    map_data::MapData,
     options::Parameters,
-    patches::Patches,
 };
 
 /// The choice of a demodulator of `meshmark-core`.
@@ -42,79 +39,12 @@ pub struct Mark<'a> {
     pub parameters: &'a Parameters,
 }
 
-/// The map before marking.
-pub struct Reference<'a> {
-    /// The data of the map.
-    pub data: &'a MapData,
-    /// The ground metric of the mark, metres per CRS unit.
-    pub ground: Ground,
-    /// The patches of its mesh.
-    pub patches: Patches,
-    /// Number of coefficients of a patch and axis that carry the message.
-    carriers: usize,
-}
-
-impl<'a> Reference<'a> {
-    /// Meshes a map and cuts it into patches; `map` is `data` on the ground.
-    ///
-    /// # Errors
-    /// Fails when a mark with these parameters does not fit the map.
-    pub fn new(data: &'a MapData, map: &Map, bits: usize, parameters: &Parameters) -> Result<Self> {
-        let patches = Patches::new(map, parameters)?;
-        let carriers = patches.carriers(bits, parameters)?;
-        Ok(Reference { data, ground: map.ground, patches, carriers })
-    }
-}
-
-/// A suspect whose vertices are matched with those of its reference.
-pub struct Matched<'a> {
-    /// The reference.
-    pub reference: &'a Reference<'a>,
-    /// The suspect, in the CRS of the reference.
-    pub suspect: &'a MapData,
-    /// Vertices of the suspect after registration, CRS units of the reference.
-    pub moved: Vec<[f64; 2]>,
-    /// The matching radius.
-    pub radius: Radius,
-    /// The matches of the vertices.
-    pub matches: Matches,
-    /// Number of vertices that match after the suspect is shifted out of place.
-    pub by_chance: usize,
-}
-
-impl<'a> Matched<'a> {
-    /// Matches the vertices of a registered suspect.
-    pub fn new(
-        reference: &'a Reference<'a>,
-        suspect: &'a MapData,
-        registration: &Registration,
-        radius: RadiusChoice,
-    ) -> Self {
-        let moved = registration.apply(suspect.vertices.coords());
-        Self::of_moved(reference, suspect, moved, |matcher, moved, unit_m| {
-            radius.choose(matcher, moved, unit_m)
-        })
-    }
-
-    /// Matches the vertices of a suspect at these places, CRS units of the reference.
-    pub(crate) fn of_moved(
-        reference: &'a Reference<'a>,
-        suspect: &'a MapData,
-        moved: Vec<[f64; 2]>,
-        radius: impl FnOnce(&Matcher, &[[f64; 2]], [f64; 2]) -> Radius,
-    ) -> Self {
-        let (ground, vertices) = (&reference.ground, &reference.data.vertices);
-        let unit_m = ground.metres_per_unit(vertices.centre());
-        let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
-        let radius = radius(&matcher, &moved, unit_m);
-        let matches = matcher.all(&moved, radius.metres);
-        let by_chance = by_chance(&matcher, &moved, unit_m, radius.metres).0.count;
-        Matched { reference, suspect, moved, radius, matches, by_chance }
-    }
-
-    /// Returns whether no more vertices match than by chance; demodulation is impossible then.
-    pub fn is_chance(&self) -> bool {
-        is_chance(self.matches.count, self.by_chance)
+impl Matched<'_> {
+    /// Returns whether no more vertices match than by chance, and, for the joint demodulator, lines
+    /// show no more corners than by chance; demodulation is impossible then.
+    pub fn is_chance(&self, demodulator: Demodulator) -> bool {
+        let is_read_by_corners = || demodulator == Demodulator::Joint && observations::corners_show(self);
+        self.is_chance_of_vertices() && !is_read_by_corners()
     }
 
     /// Demodulates with a key. The paper's demodulator uses the matches unchanged; the joint one
@@ -124,6 +54,17 @@ impl<'a> Matched<'a> {
     /// Returns the errors of the demodulation.
     pub fn demodulate(
         &self,
+        mark: Mark,
+        demodulator: Demodulator,
+        listener: Listener,
+    ) -> Result<Demodulated> {
+        self.demodulate_on(None, mark, demodulator, listener)
+    }
+
+    /// Demodulates on `given` observations, or on those with more information.
+    pub(crate) fn demodulate_on(
+        &self,
+        given: Option<Observations>,
         mark: Mark,
         demodulator: Demodulator,
         listener: Listener,
@@ -138,16 +79,20 @@ impl<'a> Matched<'a> {
             let observed = self.matches.displacements_m(coords, &self.moved, ground);
             let found = demodulation::paper(patches, &carrier, &observed, bits, parameters, &step)?;
             let weights = vec![1.0; observed.len()];
-            return Ok(self.demodulated(found, (self.radius, self.matches.clone()), None, weights));
+            let matches = (self.radius, self.matches.clone());
+            return Ok(self.demodulated(found, matches, None, weights, Observations::Vertices));
         }
         listener(Progress::Stage { stage: "deformation", steps: 0 });
         let maps = (self.reference.data, self.suspect);
         let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
-        let Followed { radius, matches, observed, disturbance } =
-            tracking.follow(self.reference.carriers, parameters, self.radius)?;
+        let carriers = self.reference.carriers;
+        let followed = tracking.follow(carriers, parameters, self.radius)?;
+        let (followed, observations) = observations::choose(self, followed, carriers, parameters, given)?;
+        let Followed { radius, matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });
         let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
-        Ok(self.demodulated(found, (radius, matches), Some(disturbance.deformation), disturbance.weights))
+        let Prediction { deformation, weights, .. } = disturbance;
+        Ok(self.demodulated(found, (radius, matches), Some(deformation), weights, observations))
     }
 
     fn demodulated(
@@ -156,9 +101,10 @@ impl<'a> Matched<'a> {
         (radius, matches): (Radius, Matches),
         deformation: Option<Deformation>,
         weights: Vec<f64>,
+        observations: Observations,
     ) -> Demodulated {
         let decoys = Decoys::new(&found, &self.suspect.vertices, &self.reference.data.vertices);
-        Demodulated { found, radius, matches, deformation, weights, decoys }
+        Demodulated { found, radius, matches, deformation, weights, observations, decoys }
     }
 }
 
@@ -175,6 +121,8 @@ pub struct Demodulated {
     /// The weight of every reference vertex: 1, or less where its displacement disagrees with the
     /// others.
     pub weights: Vec<f64>,
+    /// What the displacements were observed on.
+    pub observations: Observations,
     /// Scores of decoy keys; none where no vertex moved.
     pub decoys: Option<Decoys>,
 }

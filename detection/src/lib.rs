@@ -49,16 +49,23 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod corners;
 pub mod decision;
+mod edges;
 mod examination;
 mod groups;
 mod histogram;
+mod linework;
+mod matched;
 pub mod matching;
+mod observations;
 pub mod power;
 mod progress;
 pub mod registration;
 mod tracking;
 
-pub use examination::{Demodulated, Demodulator, Mark, Matched, Reference};
+pub use examination::{Demodulated, Demodulator, Mark};
 pub use histogram::{Histogram, round_up};
+pub use matched::{Matched, Reference};
+pub use observations::Observations;
 pub use progress::{Listener, Progress};

@@ -9,7 +9,9 @@
 
 use crate::{
     decision::{p_any_message_log10, shows_key},
-    examination::{Demodulated, Demodulator, Mark, Matched, Reference},
+    examination::{Demodulated, Demodulator, Mark},
+    linework::{Edge, Plane},
+    matched::{Matched, Reference},
     progress::Listener,
 };
 use meshmark_core::{
@@ -17,10 +19,7 @@ use meshmark_core::{
     modulation::displacements_m,
 };
 use rayon::prelude::*;
-use rstar::{
-    RTree,
-    primitives::{GeomWithData, Line},
-};
+use rstar::RTree;
 use sha2::{Digest, Sha256};
 
 /// A place of the suspect farther than this from the linework of the reference is foreign to it,
@@ -64,10 +63,15 @@ impl Power {
         let linework = Linework::new(matched.reference.data, &matched.reference.ground);
         let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
         let trial = Matched::of_moved(matched.reference, matched.suspect, moved, |_, _, _| matched.radius);
-        if trial.is_chance() {
+        if trial.is_chance(demodulator) {
             return Ok(Power::Trial(0.0));
         }
-        let trial = trial.demodulate(Mark { key: &key, ..mark }, demodulator, listener)?;
+        let trial = trial.demodulate_on(
+            Some(seen.observations),
+            Mark { key: &key, ..mark },
+            demodulator,
+            listener,
+        )?;
         Ok(Power::Trial(trial.found.mark_score(&message)))
     }
 }
@@ -83,37 +87,25 @@ fn trial_key(matched: &Matched) -> SecretKey {
 /// The segments of a reference, and its vertices without a segment, in the plane.
 struct Linework<'a> {
     ground: &'a Ground,
-    /// Metres per CRS unit in the middle of the map; the origin is there.
-    unit_m: [f64; 2],
-    centre: [f64; 2],
-    tree: RTree<GeomWithData<Line<[f64; 2]>, [u32; 2]>>,
+    plane: Plane,
+    tree: RTree<Edge>,
 }
 
 impl<'a> Linework<'a> {
     fn new(reference: &'a MapData, ground: &'a Ground) -> Self {
         let (coords, centre) = (reference.vertices.coords(), reference.vertices.centre());
-        let tree = RTree::new();
-        let mut linework = Linework { ground, unit_m: ground.metres_per_unit(centre), centre, tree };
+        let plane = Plane::new(ground, centre);
         let mut alone = vec![true; coords.len()];
         reference.segments.as_flattened().iter().for_each(|&vertex| alone[vertex as usize] = false);
         let points = (0..coords.len() as u32).filter(|&vertex| alone[vertex as usize]).map(|v| [v, v]);
-        let line = |ends: [u32; 2]| {
-            let [a, b] = ends.map(|vertex| linework.plane(coords[vertex as usize]));
-            GeomWithData::new(Line::new(a, b), ends)
-        };
-        let lines = reference.segments.iter().copied().chain(points).map(line).collect();
-        linework.tree = RTree::bulk_load(lines);
-        linework
-    }
-
-    fn plane(&self, place: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|axis| (place[axis] - self.centre[axis]) * self.unit_m[axis])
+        let tree = plane.tree(coords, reference.segments.iter().copied().chain(points));
+        Linework { ground, plane, tree }
     }
 
     /// Returns where a place of the suspect goes when the vertices of the reference move, CRS
     /// units.
     fn moved(&self, place: [f64; 2], displacement_m: &[[f64; 2]]) -> [f64; 2] {
-        let at = self.plane(place);
+        let at = self.plane.at(place);
         let Some(line) = self.tree.nearest_neighbor(&at) else { return place };
         let nearest = line.geom().nearest_point(&at);
         if (nearest[0] - at[0]).hypot(nearest[1] - at[1]) > FOREIGN_M {

@@ -371,6 +371,7 @@ fn wrong_reports_are_refused() {
         ("/parameters/demodulator", json!("best")),
         ("/parameters/significance", json!(1)),
         ("/parameters/radius_m", json!(0)),
+        ("/parameters/observations", json!("edges")),
         ("/seconds/reading", json!(-1)),
     ];
     assert_refused("report", &report, &changes);

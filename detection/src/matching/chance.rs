@@ -7,7 +7,7 @@ pub const LEAST_MATCHED: usize = 30;
 /// Fewer than this many times the vertices that match out of place also count as chance.
 const TIMES_CHANCE: usize = 2;
 /// A shift, in matching radii, that moves any map out of place.
-const OUT_OF_PLACE: [f64; 2] = [7.3, -5.1];
+pub(crate) const OUT_OF_PLACE: [f64; 2] = [7.3, -5.1];
 
 /// Returns whether `matched` vertices are no more than chance yields, where `by_chance` match out
 /// of place.

@@ -6,8 +6,8 @@ mod matcher;
 mod matches;
 mod radius;
 
-pub(crate) use chance::by_chance;
 pub use chance::{LEAST_MATCHED, is_chance, out_of_place};
+pub(crate) use chance::{OUT_OF_PLACE, by_chance};
 pub use joined::Graph;
 pub use matcher::{Matcher, Near};
 pub use matches::Matches;

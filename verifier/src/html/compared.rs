@@ -100,6 +100,7 @@ pub fn settings(report: &Report) -> Markup {
         ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
         ("Matching radius", text(format!("{} m{}", p.radius_m, report.radius_reason()))),
         ("Demodulator", text(p.demodulator.into())),
+        ("Observed on", p.observations.as_ref().map(|observations| html! { (word(observations)) })),
     ]);
     section("How the mark was assumed to be made and tested", &content)
 }

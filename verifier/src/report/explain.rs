@@ -86,12 +86,13 @@ fn found(report: &Report) -> Vec<String> {
     let mut sentences = assumed(report);
     sentences.push(format!(
         "{} of the {} reference vertices have a counterpart within {} m{}, the suspect being brought onto the reference \
-         by {}.",
+         by {}{}.",
         v.matched,
         v.reference,
         p.radius_m,
         report.radius_reason(),
-        report.registration.method
+        report.registration.method,
+        report.read_from()
     ));
     let Some(message) = &report.message else {
         sentences.push(format!("Nothing was demodulated: {}.", report.reason));

@@ -20,6 +20,7 @@ use meshmark_core::{
     options::Parameters,
 };
 use meshmark_detection::{
+    Observations,
     decision::{Decoys, Null, Verdict},
     matching::RadiusReason,
     registration::Registration,
@@ -138,6 +139,7 @@ pub struct ReportParameters {
     pub demodulator: &'static str,
     pub radius_m: f64,
     pub radius_reason: RadiusReason,
+    pub observations: Option<Observations>,
     pub significance: f64,
     pub noise_m: Option<f64>,
     pub software: String,

@@ -4,6 +4,7 @@ use super::Report;
 use crate::words::power_of_ten;
 use meshmark_core::code::Decoder;
 use meshmark_detection::{
+    Observations,
     decision::{Verdict, shows_key},
     matching::RadiusReason,
 };
@@ -30,12 +31,13 @@ impl Report {
         lines.extend(self.p_value_lines());
         let v = &self.vertices;
         lines.push(format!(
-            "vertices:     {} of {} reference vertices found within {} m{} among {} of the suspect",
+            "vertices:     {} of {} reference vertices found within {} m{} among {} of the suspect{}",
             v.matched,
             v.reference,
             self.parameters.radius_m,
             self.radius_reason(),
-            v.suspect
+            v.suspect,
+            self.read_from()
         ));
         lines.push(format!("registration: {}", self.registration.to_text()));
         lines.join("\n") + "\n"
@@ -76,6 +78,16 @@ impl Report {
             RadiusReason::Given | RadiusReason::Least => "",
             RadiusReason::Noise => " (the least radius that holds those displaced by noise)",
             RadiusReason::Groups => " of places to which their polygon groups were shifted",
+        }
+    }
+
+    /// Returns what the displacements were read from, where it is not the matched vertices.
+    pub(crate) fn read_from(&self) -> &'static str {
+        match self.parameters.observations {
+            Some(Observations::Corners) => {
+                "; its lines were drawn anew, so the displacements are those of corners between its lines"
+            }
+            Some(Observations::Vertices) | None => "",
         }
     }
 

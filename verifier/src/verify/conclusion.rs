@@ -88,6 +88,7 @@ fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters 
         },
         radius_m: seen.radius.metres,
         radius_reason: seen.radius.reason,
+        observations: seen.observations,
         significance: request.significance,
         noise_m: seen.found.as_ref().ok().map(|found| found.noise_m),
         software: format!("meshmark {}", env!("CARGO_PKG_VERSION")),

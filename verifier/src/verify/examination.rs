@@ -19,7 +19,7 @@ use crate::{
 use meshmark_core::demodulation::Demodulation;
 use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
 use meshmark_detection::{
-    Demodulated, Matched, Reference,
+    Demodulated, Matched, Observations, Reference,
     decision::{Decision, Decoys, Expected, decide_among},
     matching::{LEAST_MATCHED, Radius},
     power::Power,
@@ -42,6 +42,8 @@ pub struct Examination {
     pub radius: Radius,
     /// The demodulated evidence, or the reason why there is none.
     pub found: std::result::Result<Demodulation, String>,
+    /// What the displacements were observed on, where something was demodulated.
+    pub observations: Option<Observations>,
     /// What a present mark would show, where something was demodulated.
     pub power: Option<Power>,
     /// Scores of decoy keys.
@@ -156,10 +158,10 @@ fn demodulate(
     matched: &Matched,
     progress: &mut Progress,
 ) -> meshmark_core::Result<Option<(Demodulated, Power)>> {
-    if matched.is_chance() {
+    let (mark, demodulator) = (request.mark(), request.demodulator);
+    if matched.is_chance(demodulator) {
         return Ok(None);
     }
-    let (mark, demodulator) = (request.mark(), request.demodulator);
     let found = progress.listen(|listener| matched.demodulate(mark, demodulator, listener))?;
     let power = progress.listen(|listener| Power::measure(matched, &found, mark, demodulator, listener))?;
     Ok(Some((found, power)))
@@ -181,6 +183,7 @@ fn seen(
     let scene = Scene { matched, matches, demodulated: demodulated.as_ref() };
     let sketch = request.sketch.then(|| scene.sketch(&registration));
     let evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene, crs));
+    let observations = demodulated.as_ref().map(|demodulated| demodulated.observations);
     let (found, decoys) = match demodulated {
         Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),
         None => (Err(unregistered(&vertices, matched.by_chance, request.registration)), None),
@@ -193,6 +196,7 @@ fn seen(
         suspect_crs: Vec::new(),
         radius,
         found,
+        observations,
         power,
         decoys,
         sketch,

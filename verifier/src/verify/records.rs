@@ -48,10 +48,9 @@ struct Outcome {
     bit_errors: Option<usize>,
 }
 
-/// Verifies one suspect against every record (*.json) of a folder, each with the one of `references`
-/// from which it was made. `request` holds the other settings; its mark and reference are replaced
-/// by those of each record. `warn` receives the skipped files with
-/// the reasons.
+/// Verifies one suspect against every record (*.json) of a folder, each with the one of
+/// `references` from which it was made. `request` holds the other settings; its mark and reference
+/// are replaced by those of each record. `warn` receives the skipped files with the reasons.
 ///
 /// # Errors
 /// Fails like [`crate::verify()`], and when no record is usable.

@@ -1,0 +1,85 @@
+//! A reference and a registered suspect whose vertices are matched.
+
+use crate::{
+    matching::{Matcher, Matches, Radius, RadiusChoice, by_chance, is_chance},
+    registration::Registration,
+};
+use meshmark_core::{
+    Result, ground::Ground, map::Map, map_data::MapData, options::Parameters, patches::Patches,
+};
+
+/// The map before marking.
+pub struct Reference<'a> {
+    /// The data of the map.
+    pub data: &'a MapData,
+    /// The ground metric of the mark, metres per CRS unit.
+    pub ground: Ground,
+    /// The patches of its mesh.
+    pub patches: Patches,
+    /// Number of coefficients of a patch and axis that carry the message.
+    pub(crate) carriers: usize,
+}
+
+impl<'a> Reference<'a> {
+    /// Meshes a map and cuts it into patches; `map` is `data` on the ground.
+    ///
+    /// # Errors
+    /// Fails when a mark with these parameters does not fit the map.
+    pub fn new(data: &'a MapData, map: &Map, bits: usize, parameters: &Parameters) -> Result<Self> {
+        let patches = Patches::new(map, parameters)?;
+        let carriers = patches.carriers(bits, parameters)?;
+        Ok(Reference { data, ground: map.ground, patches, carriers })
+    }
+}
+
+/// A suspect whose vertices are matched with those of its reference.
+pub struct Matched<'a> {
+    /// The reference.
+    pub reference: &'a Reference<'a>,
+    /// The suspect, in the CRS of the reference.
+    pub suspect: &'a MapData,
+    /// Vertices of the suspect after registration, CRS units of the reference.
+    pub moved: Vec<[f64; 2]>,
+    /// The matching radius.
+    pub radius: Radius,
+    /// The matches of the vertices.
+    pub matches: Matches,
+    /// Number of vertices that match after the suspect is shifted out of place.
+    pub by_chance: usize,
+}
+
+impl<'a> Matched<'a> {
+    /// Matches the vertices of a registered suspect.
+    pub fn new(
+        reference: &'a Reference<'a>,
+        suspect: &'a MapData,
+        registration: &Registration,
+        radius: RadiusChoice,
+    ) -> Self {
+        let moved = registration.apply(suspect.vertices.coords());
+        Self::of_moved(reference, suspect, moved, |matcher, moved, unit_m| {
+            radius.choose(matcher, moved, unit_m)
+        })
+    }
+
+    /// Matches the vertices of a suspect at these places, CRS units of the reference.
+    pub(crate) fn of_moved(
+        reference: &'a Reference<'a>,
+        suspect: &'a MapData,
+        moved: Vec<[f64; 2]>,
+        radius: impl FnOnce(&Matcher, &[[f64; 2]], [f64; 2]) -> Radius,
+    ) -> Self {
+        let (ground, vertices) = (&reference.ground, &reference.data.vertices);
+        let unit_m = ground.metres_per_unit(vertices.centre());
+        let matcher = Matcher::new(vertices.coords(), ground, vertices.centre());
+        let radius = radius(&matcher, &moved, unit_m);
+        let matches = matcher.all(&moved, radius.metres);
+        let by_chance = by_chance(&matcher, &moved, unit_m, radius.metres).0.count;
+        Matched { reference, suspect, moved, radius, matches, by_chance }
+    }
+
+    /// Returns whether no more vertices match than by chance.
+    pub(crate) fn is_chance_of_vertices(&self) -> bool {
+        is_chance(self.matches.count, self.by_chance)
+    }
+}
