@@ -1,6 +1,9 @@
 //! Suspects that are made to mislead, to stall or to fetch: each gets an answer or a refusal, and nothing else
 //! is read.
 
+mod common;
+
+use common::{assert_answer, fixture, verify, write};
 use gdal::{
     Dataset, DatasetOptions, DriverManager, GdalOpenFlags,
     spatial_ref::SpatialRef,
@@ -11,41 +14,9 @@ use std::{
     fs,
     net::TcpListener,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::Command,
 };
 use tempfile::TempDir;
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
-}
-
-/// What `meshmark verify` says of a suspect against the test vectors.
-fn verify(suspect: &Path) -> (Option<i32>, String) {
-    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_meshmark"))
-        .env("GDAL_DRIVER_PATH", "none")
-        .args(["verify", "--key"])
-        .arg(fixture("vectors/key.json"))
-        .arg("--record")
-        .arg(fixture("vectors/record.json"))
-        .arg("--reference")
-        .arg(fixture("kotka.gpkg"))
-        .arg(suspect)
-        .output()
-        .unwrap();
-    (status.code(), [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat())
-}
-
-/// Asserts an exit code and a part of the text.
-fn assert_answer(suspect: &Path, code: i32, part: &str) {
-    let (found, text) = verify(suspect);
-    assert!(found == Some(code) && text.contains(part), "{}: {found:?}\n{text}", suspect.display());
-}
-
-fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
-    let path = folder.path().join(name);
-    fs::write(&path, text).unwrap();
-    path
-}
 
 /// The vertices of the marked map.
 fn marked() -> Vec<[f64; 2]> {
