@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{assert_answer, fixture, write};
+use common::{assert_answer, fixture, verify, write};
 use gdal::{
     Dataset, DriverManager, Metadata,
     vector::{Geometry, LayerAccess},
@@ -154,6 +154,20 @@ fn a_table_without_known_columns_is_refused_with_the_options_to_convert_it() {
     assert_answer(&path, 5, &command);
 }
 
+#[test]
+fn only_a_map_that_is_found_is_said_to_be_read_as_a_crs() {
+    let folder = TempDir::new().unwrap();
+    let table = |of: fn([f64; 2]) -> [f64; 2]| {
+        let rows = marked(None).into_iter().map(of).map(|[x, y]| format!("{x},{y}\n"));
+        format!("x,y\n{}", rows.collect::<String>())
+    };
+    assert_answer(&write(&folder, "marked.csv", &table(|point| point)), 0, "read as EPSG:3067");
+    // Every vertex moves in its own direction, so that nothing of the map remains.
+    let foreign = |[x, y]: [f64; 2]| [x + 500.0 * (x * 7.0).sin(), y + 500.0 * (y * 7.0).cos()];
+    let (code, text) = verify(&write(&folder, "foreign.csv", &table(foreign)));
+    assert!(code == Some(3) && !text.contains("read as"), "{text}");
+}
+
 /// The vertices of the marked map, perhaps in another CRS.
 fn marked(epsg: Option<u32>) -> Vec<[f64; 2]> {
     let mut all: Vec<[f64; 2]> = outlines(epsg).into_iter().flatten().collect();
@@ -264,6 +278,7 @@ fn drawings_that_are_none_or_have_no_end_are_refused() {
     let bomb: String = (0..16)
         .map(|i| format!("<g id=\"b{i}\">{}</g>", format!("<use href=\"#b{}\"/>", i + 1).repeat(10)))
         .collect();
+    let namespaces: String = (0..1000).map(|i| format!(" xmlns:n{i}=\"{i}\"")).collect();
     let attributes: String = (0..20_000).map(|i| format!(" a{i}=\"\"")).collect();
     for (name, text, part) in [
         ("text.svg", "no drawing".to_string(), "is no valid XML"),
@@ -277,7 +292,12 @@ fn drawings_that_are_none_or_have_no_end_are_refused() {
             svg("<g transform=\"scale(1e300)\"><path d=\"M0 0L1e300 1\"/></g>"),
             "coordinate that is too large",
         ),
-        ("names.svg", svg(&format!("<g{attributes}/>")), "more than 10000 attributes"),
+        (
+            "spaces.svg",
+            svg(&format!("<g{}/>", namespaces.replace(" xmlns", "/><g xmlns"))),
+            "has more than 100 namespaces",
+        ),
+        ("names.svg", svg(&format!("<g{attributes}/>")), "has an element of more than 256 attributes"),
         (
             "entity.svg",
             format!("<!DOCTYPE svg [<!ENTITY e SYSTEM \"/etc/passwd\">]>{}", svg("&e;")),

@@ -63,6 +63,13 @@ fn reads(driver: &str) -> bool {
         .is_ok_and(|driver| driver.metadata_item("DCAP_OPEN", "").is_some_and(|yes| yes == "YES"))
 }
 
+/// Returns whether a file name has an ending of the driver.
+fn has_ending(driver: &str, name: &str) -> bool {
+    let extensions = DriverManager::get_driver_by_name(driver).ok();
+    let extensions = extensions.and_then(|driver| driver.metadata_item("DMD_EXTENSIONS", ""));
+    extensions.is_some_and(|all| all.split(' ').any(|ending| name.ends_with(&format!(".{ending}"))))
+}
+
 /// Refuses a suspect in a format for which there is no driver.
 pub(super) fn check(path: &Path) -> Result<(), Error> {
     let name = file_name(path).to_lowercase();
@@ -90,6 +97,8 @@ pub(super) fn unopened(path: &Path, reason: &str) -> Error {
         ("is a compressed file".into(), format!("gunzip -k {shown}"))
     } else if lower.ends_with(".zip") {
         (format!("cannot be opened as a zip file ({reason})"), format!("unzip {shown}"))
+    } else if drivers().into_iter().any(|driver| has_ending(driver, &lower)) {
+        return Error::Unopened { what: "suspect", path: path.into(), reason: reason.into() }; // a broken file
     } else {
         let known = drivers().join(", ");
         (format!("cannot be opened: {reason} (a suspect may be SVG, {known})"), conversion(path))
@@ -123,7 +132,7 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns the path with another extension, and with another name where that would be the same path.
+/// Returns the path with another extension, or with another name where that would be the same path.
 fn renamed(path: &Path, extension: &str) -> PathBuf {
     let renamed = path.with_extension(extension);
     if renamed == path { path.with_extension(format!("copy.{extension}")) } else { renamed }

@@ -11,7 +11,11 @@ use gdal::{
     vector::{Geometry, LayerAccess, LayerOptions, OGRwkbGeometryType as Type},
 };
 use roxmltree::{Document, Node, ParsingOptions};
-use std::{collections::HashMap, path::Path, str::FromStr};
+use std::{
+    collections::{HashMap, HashSet},
+    path::Path,
+    str::FromStr,
+};
 use svgtypes::{PointsParser, SimplePathSegment, SimplifyingPathParser, Transform, ViewBox};
 
 /// The largest file.
@@ -20,8 +24,11 @@ const MOST_BYTES: u64 = 100_000_000;
 const MOST_POINTS: usize = 10_000_000;
 /// The most nodes of the XML tree.
 const MOST_NODES: u32 = 4_000_000;
-/// The most attributes of one element and the most namespaces, of which the parser compares each two.
-const MOST_NAMES: usize = 10_000;
+/// The most attributes of one element, of which the parser compares each two.
+const MOST_ATTRIBUTES: usize = 256;
+/// The most prefixes of namespaces, and the most declarations of them, at each of which the parser compares
+/// each two prefixes around it.
+const MOST_NAMESPACES: [usize; 2] = [100, 100_000];
 /// The most `use` elements inside each other.
 const MOST_USES: u32 = 16;
 /// The greatest distance of a curve from its chords, pixels.
@@ -89,15 +96,23 @@ fn lines(text: &str) -> Refused<Vec<Line>> {
 }
 
 /// Refuses what would let the parser work without end: entities, and too many names.
-fn check_declarations(text: &str) -> Refused<()> {
+fn check_declarations<'a>(text: &'a str) -> Refused<()> {
     if text.contains("<!ENTITY") {
         return Err("declares entities, which are not expanded".into());
     }
     let is_value = |rest: &str| rest.trim_start().starts_with(['"', '\'']);
     let attributes = |tag: &str| tag.split('=').skip(1).filter(|rest| is_value(rest)).count();
-    let most = text.split('<').map(attributes).max().unwrap_or(0);
-    if most.max(text.matches("xmlns").count()) > MOST_NAMES {
-        return Err(format!("has more than {MOST_NAMES} attributes in one element, or namespaces"));
+    if text.split('<').any(|tag| attributes(tag) > MOST_ATTRIBUTES) {
+        return Err(format!("has an element of more than {MOST_ATTRIBUTES} attributes"));
+    }
+    let declarations = || text.match_indices("xmlns").map(|(at, _)| &text[at..]);
+    let prefix = |rest: &'a str| rest.split(['=', '"', '\'', '<', '>']).next().unwrap_or_default().trim();
+    let prefixes: HashSet<&str> = declarations().map(prefix).collect();
+    let [most_prefixes, most] = MOST_NAMESPACES;
+    if prefixes.len() > most_prefixes || declarations().count() > most {
+        return Err(format!(
+            "has more than {most_prefixes} namespaces, or declares them more than {most} times"
+        ));
     }
     Ok(())
 }
