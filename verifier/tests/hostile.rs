@@ -114,7 +114,19 @@ fn no_address_in_a_suspect_is_visited() {
 <Placemark><styleUrl>{url}/style.kml#a</styleUrl><Point><coordinates>1,2</coordinates></Point></Placemark>
 </Document></kml>"#
     );
+    let gpx = format!(
+        r#"<?xml version="1.0"?><!DOCTYPE gpx [<!ENTITY e SYSTEM "{url}/entity">]>
+<gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"
+ xsi:schemaLocation="http://www.topografix.com/GPX/1/1 {url}/gpx.xsd"><wpt lat="1" lon="2"><link href="{url}/wpt"/></wpt></gpx>"#
+    );
+    let svg = format!(
+        r##"<?xml-stylesheet href="{url}/style.css"?><!DOCTYPE svg PUBLIC "svg" "{url}/svg.dtd"><svg
+ xmlns:xlink="http://www.w3.org/1999/xlink"><use href="{url}/a.svg#a"/><image xlink:href="{url}/a.png"/>
+<path d="M0 0 1 1"/></svg>"##
+    );
     for (file, text) in [
+        ("link.gpx", gpx),
+        ("link.svg", svg),
         ("link.geojson", points(&marked(), &link)),
         ("name.geojson", points(&marked(), &name)),
         ("schema.gml", gml),
@@ -127,6 +139,27 @@ fn no_address_in_a_suspect_is_visited() {
             if file.ends_with("geojson") { &[Some(0)] } else { &[Some(3), Some(5)] };
         assert!(expected.contains(&code), "{file}: {code:?} {text}");
     }
+}
+
+#[test]
+fn no_address_in_the_metadata_of_tiles_is_visited() {
+    let folder = TempDir::new().unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.set_nonblocking(true).unwrap();
+    let url = format!("http://{}/crs", listener.local_addr().unwrap());
+    let tiled = Command::new("ogr2ogr")
+        .args(["-f", "MVT", "-dsco", "MINZOOM=16", "-dsco", "MAXZOOM=16", "tiles"])
+        .arg(fixture("vectors/marked.gpkg"))
+        .current_dir(&folder)
+        .status();
+    assert!(tiled.unwrap().success());
+    let path = folder.path().join("tiles/metadata.json");
+    let scheme = r#""tile_origin_upper_left_x":0,"tile_origin_upper_left_y":0,"tile_dimension_zoom_0":1"#;
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen('{', &format!(r#"{{"crs":"{url}",{scheme},"#), 1)).unwrap();
+    let (code, text) = verify(&folder.path().join("tiles"));
+    assert!(listener.accept().is_err(), "somebody called");
+    assert!([Some(0), Some(3), Some(5)].contains(&code), "{code:?} {text}");
 }
 
 /// The marked vertices as points in a database, whose schema may have one more entry.

@@ -100,13 +100,28 @@ fn a_zipped_geodatabase_and_the_tiles_of_one_zoom_are_read() {
 #[test]
 fn a_folder_of_tiles_is_read_at_its_highest_zoom_and_a_tile_alone_too() {
     let folder = TempDir::new().unwrap();
-    let options = ["-f", "MVT", "-dsco", "MINZOOM=9", "-dsco", "MAXZOOM=16", "-dsco", "SIMPLIFICATION=0"];
-    convert(&folder, "tiles", &options);
+    let zooms = ["-dsco", "MINZOOM=9", "-dsco", "MAXZOOM=16", "-dsco", "SIMPLIFICATION=0"];
+    convert(&folder, "tiles", &[&["-f", "MVT"], &zooms[..]].concat());
+    convert(&folder, "others", &[&["-f", "MVT", "-dsco", "TILE_EXTENSION=mvt"], &zooms[..]].concat());
+    assert_answer(&folder.path().join("others"), 0, "verdict:      MATCH");
     assert_answer(&folder.path().join("tiles"), 0, "verdict:      MATCH");
     assert_answer(&folder.path().join("tiles/16"), 0, "verdict:      MATCH");
     let column = fs::read_dir(folder.path().join("tiles/9")).unwrap().next().unwrap().unwrap().path();
     let tile = fs::read_dir(column).unwrap().next().unwrap().unwrap().path();
     assert_answer(&tile, 3, "INCONCLUSIVE"); // 19 m wide grid
+}
+
+#[test]
+fn tiles_in_a_database_that_points_at_files_are_refused() {
+    let folder = TempDir::new().unwrap();
+    convert(&folder, "tiles.mbtiles", &["-f", "MBTiles", "-dsco", "MAXZOOM=16", "-dsco", "MINZOOM=16"]);
+    let path = folder.path().join("tiles.mbtiles");
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let entry = "PRAGMA writable_schema = 1; INSERT INTO sqlite_master (type, name, tbl_name, rootpage, sql) VALUES \
+                 ('table', 'x', 'x', 0, 'CREATE VIRTUAL TABLE x USING VirtualOGR(''/etc/passwd'')')";
+    database.execute_batch(entry).unwrap();
+    drop(database);
+    assert_answer(&path, 5, "may point at other files");
 }
 
 #[test]

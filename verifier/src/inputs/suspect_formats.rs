@@ -1,6 +1,6 @@
 //! The formats of suspects: those that are read, and the command that converts any other.
 
-use crate::{Error, words::printable};
+use crate::{Error, words::quoted};
 use gdal::{DriverManager, Metadata};
 use std::path::{Path, PathBuf};
 
@@ -138,12 +138,6 @@ fn renamed(path: &Path, extension: &str) -> PathBuf {
     if renamed == path { path.with_extension(format!("copy.{extension}")) } else { renamed }
 }
 
-/// Returns a path as a word of a shell.
 fn word(path: &Path) -> String {
-    let text = printable(&path.display().to_string());
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+".contains(c);
-    if text.chars().all(is_plain) && !text.starts_with('-') {
-        return text;
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
+    quoted(&path.display().to_string())
 }
