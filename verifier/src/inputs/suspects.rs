@@ -60,8 +60,7 @@ fn open_suspect(path: &Path) -> Result<Dataset> {
         return svg::open(path);
     }
     let place = highest_zoom(path).unwrap_or_else(|| path.into());
-    let dataset = open_plain(&place, &tile_options(&place))
-        .map_err(|reason| suspect_formats::unopened(path, &reason))?;
+    let dataset = open_plain(&place, &[]).map_err(|reason| suspect_formats::unopened(path, &reason))?;
     check_plain(path, &dataset)?;
     if dataset.driver().short_name() == "CSV" && tables::is_without_geometry(&dataset) {
         return open_table(path, &dataset);
@@ -84,15 +83,6 @@ fn open_table(path: &Path, table: &Dataset) -> Result<Dataset> {
 fn highest_zoom(path: &Path) -> Option<PathBuf> {
     let zooms = numbered(path).into_iter().filter(|(_, zoom)| !numbered(zoom).is_empty());
     Some(zooms.max_by_key(|&(zoom, _)| zoom)?.1)
-}
-
-/// Returns the open options for the folder of one zoom: without the extension of its tiles GDAL finds none.
-fn tile_options(zoom: &Path) -> Vec<String> {
-    let columns = numbered(zoom).into_iter();
-    let tiles = columns.flat_map(|(_, column)| column.read_dir().into_iter().flatten().flatten());
-    let extension =
-        tiles.map(|tile| tile.path()).find_map(|tile| Some(tile.extension()?.to_str()?.to_string()));
-    extension.into_iter().map(|extension| format!("@TILE_EXTENSION={extension}")).collect()
 }
 
 /// Returns what a folder has under numbers.
