@@ -395,6 +395,8 @@ fn a_csv_file_with_two_columns_of_coordinates_is_marked_and_verified_as_the_page
     host.run("ogr2ogr", &leak).succeeds();
     let xy = std::fs::read_to_string(host.path("xy.csv")).unwrap();
     std::fs::write(host.path("suspect.csv"), xy.replacen("X,Y", "lon,lat", 1)).unwrap();
+    host.matches("points.vrt", &["--record", "acme.json", "suspect.csv"]);
+    std::fs::write(host.path("suspect.csv"), xy.replacen("X,Y", "right,up", 1)).unwrap();
     let convert: Vec<&str> = block("sh").split_whitespace().collect();
     host.run(convert[0], &convert[1..]).succeeds();
     host.matches("points.vrt", &["--record", "acme.json", "suspect.gpkg"]);

@@ -104,8 +104,10 @@ pub enum Error {
     SeveralReferences,
 
     // --- inputs that cannot be read ---
-    #[error("the {what} {} cannot be opened: {reason}{formats}", path.display())]
-    Unopened { what: &'static str, path: PathBuf, reason: String, formats: String },
+    #[error("the {what} {} cannot be opened: {reason}", path.display())]
+    Unopened { what: &'static str, path: PathBuf, reason: String },
+    #[error("the suspect {} {reason}: convert it with \"{command}\"{place}, and verify the copy", path.display())]
+    Unconverted { path: PathBuf, reason: String, command: String, place: &'static str },
     #[error("the {what} {}: {source}", path.display())]
     Unmeasured { what: &'static str, path: PathBuf, source: Box<MapError> },
     #[error("{} cannot be read to its end: {source}", path.display())]
@@ -186,6 +188,7 @@ impl Error {
                 ExitCode::DoesNotBelong
             }
             Unopened { .. }
+            | Unconverted { .. }
             | Unmeasured { .. }
             | Undigested { .. }
             | NoFile { .. }

@@ -12,6 +12,24 @@ pub fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() || turns(c) { '\u{fffd}' } else { c }).collect()
 }
 
+/// Quotes a word for a shell. Characters that change the text direction are escaped for bash, zsh
+/// and ksh.
+pub(crate) fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
+    if printable(word) != word {
+        let escaped = word.chars().map(|c| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            c if printable(c.encode_utf8(&mut [0; 4])).starts_with(c) => c.into(),
+            c => format!("\\u{:04x}", u32::from(c)),
+        });
+        return format!("$'{}'", escaped.collect::<String>());
+    }
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 /// Length to which names are cut, characters; a longer name fills pages.
 const LONGEST_NAME: usize = 200;
 

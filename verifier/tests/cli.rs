@@ -56,6 +56,7 @@ fn make_files(folder: &Path) {
     make_records(folder, &record);
     write("text.txt", b"This is no map.\n");
     write("table.csv", b"name,height\nTown hall,20\n");
+    write("empty.svg", b"<svg/>");
     write("small.csv", b"id,WKT\n1,\"LINESTRING (385000 6672000,385010 6672000,385010 6672020)\"\n");
     write("degrees.csv", b"id,WKT\n1,\"LINESTRING (24.9 60.1,24.91 60.1,24.92 60.2)\"\n");
     write("far.csv", b"id,WKT\n1,\"LINESTRING (385000 6672000,385010 6672000,1e308 6672020)\"\n");

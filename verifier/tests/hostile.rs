@@ -1,6 +1,9 @@
 //! Suspects that are made to mislead, to stall or to fetch: each gets an answer or a refusal, and
 //! nothing else is read.
 
+mod common;
+
+use common::{assert_answer, fixture, verify, write};
 use gdal::{
     Dataset, DatasetOptions, DriverManager, GdalOpenFlags,
     spatial_ref::SpatialRef,
@@ -11,41 +14,9 @@ use std::{
     fs,
     net::TcpListener,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::Command,
 };
 use tempfile::TempDir;
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
-}
-
-/// What `meshmark verify` says of a suspect against the test vectors.
-fn verify(suspect: &Path) -> (Option<i32>, String) {
-    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_meshmark"))
-        .env("GDAL_DRIVER_PATH", "none")
-        .args(["verify", "--key"])
-        .arg(fixture("vectors/key.json"))
-        .arg("--record")
-        .arg(fixture("vectors/record.json"))
-        .arg("--reference")
-        .arg(fixture("kotka.gpkg"))
-        .arg(suspect)
-        .output()
-        .unwrap();
-    (status.code(), [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat())
-}
-
-/// Asserts an exit code and a part of the text.
-fn assert_answer(suspect: &Path, code: i32, part: &str) {
-    let (found, text) = verify(suspect);
-    assert!(found == Some(code) && text.contains(part), "{}: {found:?}\n{text}", suspect.display());
-}
-
-fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
-    let path = folder.path().join(name);
-    fs::write(&path, text).unwrap();
-    path
-}
 
 /// The vertices of the marked map.
 fn marked() -> Vec<[f64; 2]> {
@@ -143,7 +114,19 @@ fn no_address_in_a_suspect_is_visited() {
 <Placemark><styleUrl>{url}/style.kml#a</styleUrl><Point><coordinates>1,2</coordinates></Point></Placemark>
 </Document></kml>"#
     );
+    let gpx = format!(
+        r#"<?xml version="1.0"?><!DOCTYPE gpx [<!ENTITY e SYSTEM "{url}/entity">]>
+<gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"
+ xsi:schemaLocation="http://www.topografix.com/GPX/1/1 {url}/gpx.xsd"><wpt lat="1" lon="2"><link href="{url}/wpt"/></wpt></gpx>"#
+    );
+    let svg = format!(
+        r##"<?xml-stylesheet href="{url}/style.css"?><!DOCTYPE svg PUBLIC "svg" "{url}/svg.dtd"><svg
+ xmlns:xlink="http://www.w3.org/1999/xlink"><use href="{url}/a.svg#a"/><image xlink:href="{url}/a.png"/>
+<path d="M0 0 1 1"/></svg>"##
+    );
     for (file, text) in [
+        ("link.gpx", gpx),
+        ("link.svg", svg),
         ("link.geojson", points(&marked(), &link)),
         ("name.geojson", points(&marked(), &name)),
         ("schema.gml", gml),
@@ -156,6 +139,27 @@ fn no_address_in_a_suspect_is_visited() {
             if file.ends_with("geojson") { &[Some(0)] } else { &[Some(3), Some(5)] };
         assert!(expected.contains(&code), "{file}: {code:?} {text}");
     }
+}
+
+#[test]
+fn no_address_in_the_metadata_of_tiles_is_visited() {
+    let folder = TempDir::new().unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.set_nonblocking(true).unwrap();
+    let url = format!("http://{}/crs", listener.local_addr().unwrap());
+    let tiled = Command::new("ogr2ogr")
+        .args(["-f", "MVT", "-dsco", "MINZOOM=16", "-dsco", "MAXZOOM=16", "tiles"])
+        .arg(fixture("vectors/marked.gpkg"))
+        .current_dir(&folder)
+        .status();
+    assert!(tiled.unwrap().success());
+    let path = folder.path().join("tiles/metadata.json");
+    let scheme = r#""tile_origin_upper_left_x":0,"tile_origin_upper_left_y":0,"tile_dimension_zoom_0":1"#;
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen('{', &format!(r#"{{"crs":"{url}",{scheme},"#), 1)).unwrap();
+    let (code, text) = verify(&folder.path().join("tiles"));
+    assert!(listener.accept().is_err(), "somebody called");
+    assert!([Some(0), Some(3), Some(5)].contains(&code), "{code:?} {text}");
 }
 
 /// The marked vertices as points in a database, whose schema may have one more entry.

@@ -206,11 +206,11 @@ fn odd_suspects_make_pages_too() {
     let points: String =
         (0..500).map(|i| format!("{i},POINT ({} {})\n", 496_000 + 7 * i, 6_703_000 + i * i)).collect();
     write("points.csv", &format!("id,WKT\n{points}"));
-    write("empty.csv", "name,height\nTown hall,20\n");
+    write("empty.svg", "<svg/>");
     fs::copy(folder.path().join("marked.gpkg"), folder.path().join("Übergabe, 2. Fassung.gpkg")).unwrap();
     for (suspect, word) in [
         ("points.csv", "Inconclusive"),
-        ("empty.csv", "Inconclusive"),
+        ("empty.svg", "Inconclusive"),
         ("Übergabe, 2. Fassung.gpkg", "Match"),
     ] {
         let page = page(folder.path(), &[&VERIFY[..], &RECORD, &[suspect]].concat());

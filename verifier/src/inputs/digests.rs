@@ -53,7 +53,7 @@ impl Inputs {
     }
 }
 
-/// Returns the SHA-256 of a file. For a folder, or a file with companions of the same name, it is
+/// Returns the SHA-256 of a file. For a folder with all in it, or a file with companions of the same name, it is
 /// that of the sorted list of their digests as `sha256sum` prints it.
 pub(crate) fn digest(path: &Path) -> Result<Digested> {
     let failed = |error: io::Error| Error::Undigested { path: path.into(), source: error };
@@ -64,8 +64,9 @@ pub(crate) fn digest(path: &Path) -> Result<Digested> {
         [file] if file == path => format!("SHA-256 {}", file_digest(file).map_err(failed)?),
         files => {
             let mut list = String::new();
+            let folder = if path.is_dir() { path } else { folder_of(path) };
             for file in files {
-                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                let name = file.strip_prefix(folder).unwrap_or(file).to_string_lossy();
                 let _ = writeln!(list, "{}  {name}", file_digest(file).map_err(failed)?);
             }
             format!(
@@ -91,16 +92,30 @@ fn files_of(path: &Path) -> io::Result<Vec<PathBuf>> {
     } else if !path.is_dir() {
         return Ok(Vec::new());
     }
-    let folder = if path.is_dir() { path } else { folder_of(path) };
     let mut files = Vec::new();
-    for entry in folder.read_dir()? {
-        let file = entry?.path();
-        if file.is_file() && (path.is_dir() || file.file_stem() == path.file_stem()) {
-            files.push(file);
+    if path.is_dir() {
+        collect(path, &mut files)?;
+    } else {
+        for entry in folder_of(path).read_dir()? {
+            let file = entry?.path();
+            files.extend(Some(file).filter(|file| file.is_file() && file.file_stem() == path.file_stem()));
         }
     }
     files.sort();
     Ok(files)
+}
+
+/// Appends the files of a folder and of the folders in it. Links to folders are not followed.
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    for entry in folder.read_dir()? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            collect(&entry.path(), files)?;
+        } else if entry.path().is_file() {
+            files.push(entry.path());
+        }
+    }
+    Ok(())
 }
 
 fn file_digest(path: &Path) -> io::Result<String> {
@@ -142,6 +157,10 @@ mod tests {
         );
         let all = text_digest(list(&["a.dbf", "a.shp", "b.shp", "map.gpkg"]).as_bytes());
         assert!(digest(folder.path()).unwrap().digest.contains(&all));
+        std::fs::create_dir_all(file("9/1")).unwrap();
+        std::fs::write(file("9/1/2.pbf"), "abc").unwrap();
+        let all = text_digest(list(&["9/1/2.pbf", "a.dbf", "a.shp", "b.shp", "map.gpkg"]).as_bytes());
+        assert!(digest(folder.path()).unwrap().digest.contains(&all), "tiles lie in folders");
         assert!(digest(&file("none")).unwrap().digest.contains("no digest"));
     }
 }

@@ -24,7 +24,7 @@ pub struct Reading<'a> {
 
 /// Reads the reference, which is any vector dataset that GDAL opens.
 pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
-    let dataset = open("reference", path, None)?;
+    let dataset = open("reference", path)?;
     if let LabelFields::Named(names) = reading.landmarks {
         check_fields(path, &dataset, names)?;
     }
@@ -40,7 +40,7 @@ pub(crate) fn source(
     if marked_view::is_named_by(path) {
         return Err(Error::MarkedView { path: path.into() });
     }
-    let dataset = open("map", path, None)?;
+    let dataset = open("map", path)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
     let survey = read("map", path, &dataset, &reading, TargetCrs::Own)?;
@@ -54,7 +54,7 @@ pub fn geometries(
     path: &Path,
     layers: Option<&[String]>,
 ) -> Result<(Vec<FeatureGeometry>, Option<CoordinateSystem>)> {
-    let dataset = open(what, path, None)?;
+    let dataset = open(what, path)?;
     forget_failure();
     let found = features(&dataset, layers, &last_failure);
     Ok((
@@ -88,25 +88,31 @@ fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> 
     Err(Error::UnknownField { path: path.into(), field: name.clone(), known })
 }
 
-pub(super) fn open(what: &'static str, path: &Path, allowed_drivers: Option<&[&str]>) -> Result<Dataset> {
+fn open(what: &'static str, path: &Path) -> Result<Dataset> {
     if holds_password(path) {
         return Err(Error::Password { what });
     }
+    open_with(path, None, &[]).map_err(|reason| Error::Unopened { what, path: path.into(), reason })
+}
+
+/// Opens a dataset with these drivers, all without names, and with open options beside the usual ones.
+/// The error is GDAL's reason.
+pub(super) fn open_with(
+    path: &Path,
+    allowed_drivers: Option<&[&str]>,
+    options: &[String],
+) -> std::result::Result<Dataset, String> {
     forget_failure();
     let mut open_options = marking::OPEN_OPTIONS.to_vec();
     open_options.push("@WRITE_GFS=NO"); // reading a map creates no file beside it
+    open_options.extend(options.iter().map(String::as_str));
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
         open_options: Some(&open_options),
         allowed_drivers,
         ..Default::default()
     };
-    Dataset::open_ex(path, options).map_err(|error| {
-        let reason = last_failure().unwrap_or_else(|| error.to_string());
-        let formats =
-            allowed_drivers.map_or(String::new(), |d| format!(" (a suspect may be {})", d.join(", ")));
-        Error::Unopened { what, path: path.into(), reason, formats }
-    })
+    Dataset::open_ex(path, options).map_err(|error| last_failure().unwrap_or_else(|| error.to_string()))
 }
 
 /// Returns whether the connection string of a database holds its password: as `password=…`, `pwd=…`

@@ -4,5 +4,8 @@
 pub mod digests;
 pub mod gdal_failures;
 pub mod maps;
+mod suspect_formats;
 pub mod suspects;
+mod svg;
+mod tables;
 pub mod texts;

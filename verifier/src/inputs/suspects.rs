@@ -1,6 +1,9 @@
 //! Suspects, which may be manipulated: only local files of plain formats are read, without network.
 
-use super::maps::{Reading, failed, first_crs, open, read, survey_of};
+use super::{
+    maps::{Reading, failed, first_crs, open_with, read, survey_of},
+    suspect_formats, svg, tables,
+};
 use crate::{Error, Result, words::printable};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_dataset::{CoordinateSystem, Survey, TargetCrs};
@@ -8,24 +11,6 @@ use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
 };
-
-/// The drivers for suspects: local files of plain formats. Formats that refer to other data (VRT,
-/// SQL, network) are excluded, as a suspect may be manipulated, and so is MESHMARK.
-const SUSPECT_DRIVERS: &[&str] = &[
-    "GPKG",
-    "ESRI Shapefile",
-    "GeoJSON",
-    "GeoJSONSeq",
-    "FlatGeobuf",
-    "GML",
-    "KML",
-    "LIBKML",
-    "MapInfo File",
-    "DXF",
-    "CSV",
-    "SQLite",
-    "TopoJSON",
-];
 
 /// A suspect after reading.
 pub struct Suspect {
@@ -70,9 +55,40 @@ fn open_suspect(path: &Path) -> Result<Dataset> {
     }
     forbid_network().map_err(|error| Error::NoOption { reason: error.to_string() })?;
     check_table(path)?;
-    let dataset = open("suspect", path, Some(SUSPECT_DRIVERS))?;
+    suspect_formats::check(path)?;
+    if svg::is_named(path) {
+        return svg::open(path);
+    }
+    let place = highest_zoom(path).unwrap_or_else(|| path.into());
+    let dataset = open_plain(&place, &[]).map_err(|reason| suspect_formats::unopened(path, &reason))?;
     check_plain(path, &dataset)?;
+    if dataset.driver().short_name() == "CSV" && tables::is_without_geometry(&dataset) {
+        return open_table(path, &dataset);
+    }
     Ok(dataset)
+}
+
+fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, String> {
+    open_with(path, Some(&suspect_formats::drivers()), options)
+}
+
+/// Opens a table again, with the columns of its coordinates.
+fn open_table(path: &Path, table: &Dataset) -> Result<Dataset> {
+    let options =
+        tables::open_options(table).ok_or_else(|| suspect_formats::table_without_coordinates(path))?;
+    open_plain(path, &options).map_err(|reason| suspect_formats::unopened(path, &reason))
+}
+
+/// Returns the folder of the highest zoom of a folder of tiles, named z/x/y.pbf.
+fn highest_zoom(path: &Path) -> Option<PathBuf> {
+    let zooms = numbered(path).into_iter().filter(|(_, zoom)| !numbered(zoom).is_empty());
+    Some(zooms.max_by_key(|&(zoom, _)| zoom)?.1)
+}
+
+/// Returns what a folder has under numbers.
+fn numbered(folder: &Path) -> Vec<(u32, PathBuf)> {
+    let entries = folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
+    entries.filter_map(|entry| Some((entry.file_name()?.to_str()?.parse().ok()?, entry))).collect()
 }
 
 /// Prevents network access. A suspect may name addresses, as the CRS of a GeoJSON file or as the
@@ -124,24 +140,44 @@ const PLAIN_MODULES: &[&str] = &[
     "virtualknn2",
 ];
 
+/// What a forged schema says of tables may have any type, page and spacing, and SQLite uses only its text.
+const VIRTUAL_TABLES: &str = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
+
 /// Refuses a database with virtual tables that take their rows from elsewhere.
 fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
-    if !matches!(dataset.driver().short_name().as_str(), "GPKG" | "SQLite") {
-        return Ok(());
-    }
-    let failed =
-        |error: gdal::errors::GdalError| Error::Unread { path: path.into(), reason: error.to_string() };
-    // A forged schema may have any type, page and spacing, and SQLite uses only its text.
-    let query = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
-    let tables = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT).map_err(failed)?;
-    let Some(mut tables) = tables else { return Ok(()) };
-    for table in tables.features() {
-        let text = |field: usize| table.field_as_string(field).ok().flatten().unwrap_or_default();
-        if !is_plain(&text(1)) {
-            return Err(Error::VirtualTable { path: path.into(), table: text(0).escape_debug().to_string() });
+    let failed = |reason: String| Error::Unread { path: path.into(), reason };
+    let tables = match dataset.driver().short_name().as_str() {
+        "GPKG" | "SQLite" => virtual_tables(dataset).map_err(|error| failed(error.to_string()))?,
+        "MBTiles" => virtual_tables_of_tiles(path).map_err(|error| failed(error.to_string()))?,
+        _ => return Ok(()),
+    };
+    match tables.into_iter().find(|(_, sql)| !is_plain(sql)) {
+        Some((table, _)) => {
+            Err(Error::VirtualTable { path: path.into(), table: table.escape_debug().to_string() })
         }
+        None => Ok(()),
     }
-    Ok(())
+}
+
+/// Returns names and definitions.
+fn virtual_tables(dataset: &Dataset) -> gdal::errors::Result<Vec<(String, String)>> {
+    let tables = dataset.execute_sql(VIRTUAL_TABLES, None, gdal::vector::sql::Dialect::DEFAULT)?;
+    let Some(mut tables) = tables else { return Ok(Vec::new()) };
+    let text = |table: &gdal::vector::Feature, field: usize| {
+        table.field_as_string(field).ok().flatten().unwrap_or_default()
+    };
+    Ok(tables.features().map(|table| (text(&table, 0), text(&table, 1))).collect())
+}
+
+/// Returns names and definitions; GDAL's driver for MBTiles accepts no SQL.
+fn virtual_tables_of_tiles(path: &Path) -> rusqlite::Result<Vec<(String, String)>> {
+    let database = rusqlite::Connection::open_with_flags(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+    let text = |row: &rusqlite::Row, column: usize| {
+        row.get_ref(column)
+            .map(|value| String::from_utf8_lossy(value.as_bytes().unwrap_or_default()).into_owned())
+    };
+    let mut query = database.prepare(VIRTUAL_TABLES)?;
+    query.query_map((), |row| Ok((text(row, 0)?, text(row, 1)?)))?.collect()
 }
 
 /// Returns whether the module of CREATE VIRTUAL TABLE name USING module(…) is a plain one. Every

@@ -1,7 +1,7 @@
 //! The parts of a report file beyond the answer.
 
 use super::sketch::Sketch;
-use crate::{inputs::digests::Inputs, words::printable};
+use crate::{inputs::digests::Inputs, words::quoted};
 use serde::Serialize;
 
 /// The places of the evidence on the map.
@@ -58,24 +58,6 @@ pub fn command_line(arguments: impl Iterator<Item = String>) -> String {
     words.extend(["--report".into(), "report.html".into()]);
     words.extend(files);
     words.join(" ")
-}
-
-/// Quotes a word for a shell. Characters that change the text direction are escaped for bash, zsh
-/// and ksh.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
-    if printable(word) != word {
-        let escaped = word.chars().map(|c| match c {
-            '\'' | '\\' => format!("\\{c}"),
-            c if printable(c.encode_utf8(&mut [0; 4])).starts_with(c) => c.into(),
-            c => format!("\\u{:04x}", u32::from(c)),
-        });
-        return format!("$'{}'", escaped.collect::<String>());
-    }
-    match !word.is_empty() && word.chars().all(is_plain) {
-        true => word.into(),
-        false => format!("'{}'", word.replace('\'', r"'\''")),
-    }
 }
 
 #[cfg(test)]

@@ -175,6 +175,9 @@ fn seen(
     crs: Option<&CoordinateSystem>,
 ) -> Examination {
     let (demodulated, power) = demodulated.unzip();
+    // A CRS is only found where the suspect is.
+    let read_as = registration.read_as.clone().filter(|_| demodulated.is_some());
+    let registration = Registration { read_as, ..registration };
     let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
     let radius = demodulated.as_ref().map_or(matched.radius, |demodulated| demodulated.radius);
     let reference = &matched.reference.data.vertices;
