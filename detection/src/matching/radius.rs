@@ -72,8 +72,9 @@ fn from_data(matcher: &Matcher, moved: &[[f64; 2]], unit_m: [f64; 2]) -> Radius 
     let most = matcher.reference_count().min(moved.len()) as f64;
     let within = |radius: usize| excess(found[radius], chance[radius], most);
     let sensible = |radius: &usize| within(*radius) >= (1.0 - MOST_CHANCE) * found[*radius];
-    let last = (0..RADII_M.len()).rev().find(sensible).unwrap_or(0);
-    let first = (0..=last).find(|&radius| within(radius) >= ENOUGH * within(last)).unwrap_or(0);
+    let sensible = (0..RADII_M.len()).filter(sensible).map(within);
+    let matching = sensible.fold(0.0, f64::max);
+    let first = (0..RADII_M.len()).find(|&radius| within(radius) >= ENOUGH * matching).unwrap_or(0);
     let reason = if first == 0 { RadiusReason::Least } else { RadiusReason::Noise };
     Radius { metres: RADII_M[first], reason }
 }
@@ -89,4 +90,44 @@ fn excess(found: f64, by_chance: f64, most: f64) -> f64 {
 fn counts(matcher: &Matcher, moved: &[[f64; 2]], matches: &Matches) -> [f64; RADII_M.len()] {
     let distances = matcher.distances_m(moved, matches);
     RADII_M.map(|radius_m| distances.iter().filter(|distance| **distance <= radius_m).count() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use meshmark_core::ground::Ground;
+
+    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
+
+    /// Returns a number from −1 to 1 that looks random.
+    fn random(i: usize) -> f64 {
+        ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / 2f64.powi(52) - 1.0
+    }
+
+    /// Chooses the radius for 900 vertices, 7 m apart on average, of which every `every`-th one moves
+    /// by up to `noise_m` along each axis.
+    fn chosen(noise_m: f64, every: usize) -> Radius {
+        let place = |i: usize| [(i % 30) as f64 * 7.0, (i / 30) as f64 * 7.0];
+        let reference: Vec<[f64; 2]> =
+            (0..900).map(|i| [0, 1].map(|axis| place(i)[axis] + 2.0 * random(2 * i + axis))).collect();
+        let noise = |i: usize| if i.is_multiple_of(every) { noise_m } else { 0.0 };
+        let each = reference.iter().enumerate();
+        let moved: Vec<[f64; 2]> =
+            each.map(|(i, p)| [0, 1].map(|axis| p[axis] + noise(i) * random(5001 + 2 * i + axis))).collect();
+        let matcher = Matcher::new(&reference, &METRES, [100.0, 100.0]);
+        RadiusChoice::FromData.choose(&matcher, &moved, [1.0, 1.0])
+    }
+
+    #[test]
+    fn the_radius_grows_with_the_noise_and_not_with_a_few_vertices_that_went_astray() {
+        assert_eq!(chosen(0.0, 1), Radius { metres: 1.0, reason: RadiusReason::Least });
+        assert_eq!(chosen(0.5, 1), Radius { metres: 1.0, reason: RadiusReason::Least });
+        assert_eq!(chosen(1.3, 1), Radius { metres: 1.5, reason: RadiusReason::Noise });
+        assert_eq!(chosen(1.8, 1), Radius { metres: 2.0, reason: RadiusReason::Noise });
+        assert_eq!(chosen(2.5, 60), Radius { metres: 1.0, reason: RadiusReason::Least });
+        let given = RadiusChoice::Given(0.4);
+        let matcher = Matcher::new(&[[0.0; 2]], &METRES, [0.0; 2]);
+        let found = given.choose(&matcher, &[[3.0; 2]], [1.0; 2]);
+        assert_eq!(found, Radius { metres: 0.4, reason: RadiusReason::Given });
+    }
 }

@@ -246,8 +246,11 @@ fn decide_all(
 
 /// Returns the decision on all candidates, with the grounds of the best one.
 fn overall(outcomes: &[Outcome]) -> Decision {
-    let best = outcomes[0].decision.clone();
     let matches = count_matches(outcomes);
+    let mut best = outcomes[0].decision.clone();
+    if matches == 0 {
+        best.p_missed_log10 = outcomes.iter().filter_map(|o| o.decision.p_missed_log10).reduce(f64::max);
+    }
     let unclear = outcomes.iter().find(|o| o.decision.verdict == Verdict::Inconclusive);
     match (matches, unclear) {
         (0, Some(unclear)) => {
