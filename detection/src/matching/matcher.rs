@@ -98,7 +98,11 @@ impl<'a> Matcher<'a> {
     /// Returns the point of `tree` nearest to `from` on the ground, within `radius_m`. The smaller
     /// index wins ties.
     fn nearest(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> Option<u32> {
-        let within = self.within(tree, from, radius_m);
+        // The nearest point of the plane bounds the distance, so that a heap of points costs nothing.
+        let [mx, my] = self.ground.metres_per_unit(from);
+        let (at, near) = (self.plane(from), tree.nearest_neighbor(&self.plane(from))?.geom());
+        let bound_m = ((near[0] - at[0]) * mx / self.x_scale).hypot((near[1] - at[1]) * my);
+        let within = self.within(tree, from, radius_m.min(bound_m * (1.0 + 1e-9)));
         within.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, index)| index)
     }
 
@@ -164,5 +168,15 @@ mod tests {
         let matcher = Matcher::new(&reference, &ground, [10.0, 35.0]);
         assert_eq!(matcher.all(&reference.map(east), 0.7).count, 2);
         assert_eq!(matcher.all(&reference.map(east), 0.6).count, 0);
+    }
+
+    #[test]
+    fn a_heap_of_vertices_is_matched_as_few_of_them_are() {
+        let reference: Vec<[f64; 2]> = (0..400).map(|i| [f64::from(i % 20), f64::from(i / 20)]).collect();
+        let heap = (0..200_000).map(|i| [10.2 + f64::from(i) * 1e-7, 10.3 + f64::from(i % 317) * 1e-7]);
+        let few: Vec<[f64; 2]> = reference.iter().map(|p| [p[0] + 0.1, p[1] - 0.05]).collect();
+        let all: Vec<[f64; 2]> = few.iter().copied().chain(heap).collect();
+        let matcher = Matcher::new(&reference, &METRES, [10.0, 10.0]);
+        assert_eq!(matcher.all(&all, 6.0).suspect_of, matcher.all(&few, 6.0).suspect_of);
     }
 }
