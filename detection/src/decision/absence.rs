@@ -81,8 +81,8 @@ impl Unmatched<'_> {
         if self.power == Power::KeyShows && self.fullness() < LEAST_FULLNESS {
             return Some(
                 "a mark of this key is there, and its bits are weaker than those of one copy: copies of several \
-                 recipients may be mixed, or features replaced, so that nobody can be ruled out; a part of the suspect \
-                 may show more than all of it"
+                 recipients may be mixed, features replaced, or the mark made with another code, so that nobody can be ruled \
+                 out; a part of the suspect may show more than all of it"
                     .into(),
             );
         }
