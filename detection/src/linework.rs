@@ -12,9 +12,10 @@ pub type Edge = GeomWithData<Line<[f64; 2]>, [u32; 2]>;
 /// A plane of metres, whose origin is the middle of a map.
 #[derive(Debug, Clone, Copy)]
 pub struct Plane {
-    centre: [f64; 2],
+    /// The middle, CRS units.
+    pub centre: [f64; 2],
     /// Metres per CRS unit at the centre.
-    unit_m: [f64; 2],
+    pub unit_m: [f64; 2],
 }
 
 impl Plane {

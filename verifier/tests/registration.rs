@@ -6,7 +6,7 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{LabelFields, Selection, survey};
-use meshmark_detection::registration::{Affine, Registrar, Registration, Start};
+use meshmark_detection::registration::{Affine, Method, Registrar, Registration, Start};
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
@@ -141,7 +141,7 @@ fn assert_found(reference: &Map, left: impl Fn(Map) -> Map, within_m: f64) {
         let found = register(reference, &suspect, Start::Geometry);
         let error_m = error_m(reference, |p| there.apply(p), &found);
         assert!(error_m < within_m, "mirror {mirror}: {error_m} m, {found:?}");
-        assert_eq!((found.method, found.polynomial), ("geometry", None));
+        assert_eq!((found.method, found.polynomial), (Method::Geometry, None));
     }
 }
 

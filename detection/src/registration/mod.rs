@@ -3,21 +3,24 @@
 //!
 //! Starting points are the identity, landmarks (features with equal attribute values) and geometry
 //! (features of equal shape, then equal arrangements of neighbouring vertices). Each start is
-//! refined on matched vertices, and the one with most matched vertices wins. Registration uses no
-//! key.
+//! refined on matched vertices, and the one with most matched vertices wins. Where the vertices of
+//! the suspect are new, the course of its lines takes their place. Registration uses no key.
 
 mod affine;
 mod consensus;
 mod cubic;
+mod curves;
 mod landmarks;
+mod moments;
 mod polylines;
 mod registrar;
 mod result;
 mod search;
+mod similarity;
 mod windows;
 
 pub use affine::Affine;
 pub use cubic::{Cubic, TERMS, Transform};
 pub use registrar::Registrar;
-pub use result::{ReadAs, Registration};
+pub use result::{Method, ReadAs, Registration};
 pub use search::Start;

@@ -16,8 +16,8 @@ const SOME_AGREE: f64 = 0.2;
 /// The transformation of a suspect onto the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Registration {
-    /// Start of the search: "identity", "landmarks" or "geometry".
-    pub method: &'static str,
+    /// How it was found.
+    pub method: Method,
     /// The CRS assumed for the coordinates of the suspect, where its own is missing or wrong.
     pub read_as: Option<ReadAs>,
     /// Coefficients from the coordinates of the suspect, in the CRS of the reference, to those of
@@ -27,15 +27,40 @@ pub struct Registration {
     pub polynomial: Option<Cubic>,
     /// Number of feature pairs that agree with the result; 0 where none were needed.
     pub landmarks: usize,
-    /// Root mean square distance of matched vertices after registration, metres; null when none
-    /// matched.
+    /// Root mean square distance of matched vertices, or of laid lines, after registration, metres;
+    /// null when none matched.
     pub rms_m: Option<f64>,
-    /// Number of matched vertices in a sample.
+    /// Number of matched vertices, or of laid lines, in a sample.
     #[serde(skip)]
     pub matched: usize,
     /// The same number as a share of the smaller map.
     #[serde(skip)]
     pub share: f64,
+}
+
+/// How a registration was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// From the position as it stands.
+    Identity,
+    /// From features with equal attribute values.
+    Landmarks,
+    /// From features of equal shape, and vertices in equal arrangements.
+    Geometry,
+    /// By the course of lines, whose vertices are new.
+    Curves,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Method::Identity => "identity",
+            Method::Landmarks => "landmarks",
+            Method::Geometry => "geometry",
+            Method::Curves => "curves",
+        })
+    }
 }
 
 /// The CRS assumed for a map.

@@ -4,12 +4,19 @@ use super::{
     affine::Affine,
     consensus::consensus,
     cubic::{Cubic, Transform},
-    landmarks, polylines,
+    curves::Curves,
+    landmarks,
+    moments::likenesses,
+    polylines,
     registrar::Registrar,
-    result::Registration,
+    result::{Method, Registration},
+    similarity::vote,
     windows::{self, Arrangement, Window},
 };
-use crate::matching::{LEAST_MATCHED, is_chance, out_of_place};
+use crate::{
+    linework::Plane,
+    matching::{LEAST_MATCHED, is_chance, out_of_place},
+};
 use meshmark_core::{map_data::MapData, vertices::VertexTable};
 
 /// Above this share of matched vertices there is no distortion to follow.
@@ -22,6 +29,8 @@ const POLISH: usize = 2;
 const STILL_MATCHED: f64 = 0.98;
 /// Largest distance of place pairs that show a distortion, in matching radii.
 const DISTORTED: f64 = 50.0;
+/// Places of features whose vertices are new agree within so many matching radii.
+const REACH: f64 = 4.0;
 /// Least number of pairs for the fit of a polynomial.
 const LEAST_FOR_CUBIC: usize = 40;
 
@@ -59,12 +68,12 @@ impl Registrar<'_> {
     /// Returns the registration by the identity, without a search.
     pub fn as_it_stands(&self, suspect: &MapData) -> Registration {
         let search = Search { registrar: self, suspect };
-        search.registration("identity", 0, &search.matched(Affine::IDENTITY.into(), self.radius_m))
+        search.registration(Method::Identity, 0, &search.matched(Affine::IDENTITY.into(), self.radius_m))
     }
 
     /// Registers a suspect that is approximately in place.
     pub fn refine_in_place(&self, suspect: &MapData) -> Registration {
-        Search { registrar: self, suspect }.refine("identity", Affine::IDENTITY, 0)
+        Search { registrar: self, suspect }.refine(Method::Identity, Affine::IDENTITY, 0)
     }
 }
 
@@ -95,7 +104,7 @@ impl Search<'_> {
     /// Returns the best registration of several ways.
     fn best(&self, ways: &[Way]) -> Registration {
         let mut pairs: Vec<PlacePair> = Vec::new();
-        let mut best = self.nothing("identity");
+        let mut best = self.nothing(Method::Identity);
         for way in ways {
             let costly = matches!(way, Way::Lines | Way::Points);
             if best.agrees() || costly && best.agrees_in_part() {
@@ -107,9 +116,39 @@ impl Search<'_> {
             }
         }
         if self.is_chance(&best) {
-            return self.nothing(best.method);
+            return self.along_curves(&pairs).unwrap_or_else(|| self.nothing(best.method));
         }
         self.bend(&best, &pairs).unwrap_or(best)
+    }
+
+    /// Registers by the course of lines; `None` where no more of them agree than by chance, or
+    /// where the suspect is in its place already.
+    fn along_curves(&self, pairs: &[PlacePair]) -> Option<Registration> {
+        let registrar = self.registrar;
+        let plane = Plane::new(registrar.ground, registrar.reference.vertices.centre());
+        let curves = Curves::new(registrar.reference, self.suspect, plane, registrar.radius_m);
+        let in_place = curves.laid(Affine::IDENTITY);
+        if curves.agrees(&in_place) {
+            return None;
+        }
+        let near_m = REACH * registrar.radius_m;
+        let of_places: Vec<PlacePair> = pairs.iter().map(|pair| pair.map(|place| plane.at(place))).collect();
+        let (ours, theirs) = (&registrar.reference.polylines, &self.suspect.polylines);
+        let starts = [
+            Some((Affine::IDENTITY, 0)),
+            consensus(&of_places, [1.0; 2], near_m),
+            vote(&likenesses(ours, theirs, |place| plane.at(place)), near_m),
+        ];
+        let refined = starts.into_iter().flatten().map(|(affine, agree)| (curves.refine(affine), agree));
+        let (laid, landmarks) = refined.max_by_key(|(laid, _)| laid.count)?;
+        curves.agrees(&laid).then(|| Registration {
+            landmarks,
+            affine: curves.in_units(laid.affine),
+            rms_m: Some(laid.rms_m),
+            matched: laid.count,
+            share: laid.count as f64 / curves.len() as f64,
+            ..self.nothing(Method::Curves)
+        })
     }
 
     /// Returns whether about as many vertices match after the suspect is shifted out of place.
@@ -121,7 +160,7 @@ impl Search<'_> {
         is_chance(found.matched, self.matched(shifted.into(), radius_m).from.len())
     }
 
-    fn nothing(&self, method: &'static str) -> Registration {
+    fn nothing(&self, method: Method) -> Registration {
         let as_it_stands = self.registrar.as_it_stands(self.suspect);
         Registration { method, matched: 0, share: 0.0, ..as_it_stands }
     }
@@ -130,10 +169,12 @@ impl Search<'_> {
     fn by_way(&self, way: Way, pairs: &mut Vec<PlacePair>) -> Registration {
         let reference = self.registrar.reference;
         let (method, found) = match way {
-            Way::AsItStands => return self.refine("identity", Affine::IDENTITY, 0),
+            Way::AsItStands => return self.refine(Method::Identity, Affine::IDENTITY, 0),
             Way::Lines | Way::Points => return self.by_windows(way),
-            Way::Landmarks => ("landmarks", landmarks::pairs(&reference.labels, &self.suspect.labels)),
-            Way::Polylines => ("geometry", polylines::pairs(&reference.polylines, &self.suspect.polylines)),
+            Way::Landmarks => (Method::Landmarks, landmarks::pairs(&reference.labels, &self.suspect.labels)),
+            Way::Polylines => {
+                (Method::Geometry, polylines::pairs(&reference.polylines, &self.suspect.polylines))
+            }
         };
         // The places of cut or edited features are off by an unknown amount, so the consensus tries
         // several radii.
@@ -149,7 +190,7 @@ impl Search<'_> {
         let candidates = |ours: Vec<Window>, theirs: Vec<Window>, arrangement: Arrangement| {
             let within_m = 3.0 * self.registrar.radius_m;
             let found = windows::candidates(ours, theirs, arrangement, self.registrar.ground, within_m);
-            self.best_start("geometry", found.into_iter())
+            self.best_start(Method::Geometry, found.into_iter())
         };
         if way == Way::Lines {
             let (ours, theirs) =
@@ -174,11 +215,7 @@ impl Search<'_> {
     }
 
     /// Refines several affine maps and returns the best; without any, the identity without matches.
-    fn best_start(
-        &self,
-        method: &'static str,
-        starts: impl Iterator<Item = (Affine, usize)>,
-    ) -> Registration {
+    fn best_start(&self, method: Method, starts: impl Iterator<Item = (Affine, usize)>) -> Registration {
         let mut best = self.nothing(method);
         for (affine, agree) in starts {
             let next = self.refine(method, affine, agree);
@@ -193,7 +230,7 @@ impl Search<'_> {
     }
 
     /// Refines an affine map on the vertices that match under it.
-    fn refine(&self, method: &'static str, start: Affine, landmarks: usize) -> Registration {
+    fn refine(&self, method: Method, start: Affine, landmarks: usize) -> Registration {
         let radius_m = self.registrar.radius_m;
         let mut best = self.matched(start.into(), radius_m);
         for factor in [4.0, 2.0, 1.0, 1.0, 1.0, 1.0] {
@@ -298,7 +335,7 @@ impl Search<'_> {
     }
 
     /// Returns the registration for a transformation and the vertices that match under it.
-    fn registration(&self, method: &'static str, landmarks: usize, pairs: &Pairs) -> Registration {
+    fn registration(&self, method: Method, landmarks: usize, pairs: &Pairs) -> Registration {
         let matched = pairs.from.len();
         // A sample of the reference limits the number of possible matches.
         let smaller = self.registrar.reference.vertices.len().min(self.suspect.vertices.len());
@@ -380,7 +417,7 @@ mod tests {
         let ours = MapData { labels, ..MapData::of_points(reference) };
         let theirs = MapData { labels: theirs, ..MapData::of_points(suspect) };
         let found = Registrar::new(&ours, &METRES, 1.0).register(&theirs, Start::Auto);
-        assert_eq!((found.method, found.landmarks), ("landmarks", 30));
+        assert_eq!((found.method, found.landmarks), (Method::Landmarks, 30));
         assert!(found.rms_m.unwrap() < 1e-6, "{found:?}");
     }
 
@@ -391,7 +428,7 @@ mod tests {
         let suspect = VertexTable::new(moved).unwrap();
         let (reference, suspect) = (MapData::of_points(reference), MapData::of_points(suspect));
         let found = Registrar::new(&reference, &METRES, 1.0).register(&suspect, Start::Auto);
-        assert_eq!(found.method, "identity");
+        assert_eq!(found.method, Method::Identity);
         assert!(found.rms_m.unwrap() < 1e-6, "{found:?}");
     }
 }

@@ -6,14 +6,15 @@ use super::{
 };
 use crate::report::{Evidence, Report, explain};
 use maud::{Markup, html};
-use meshmark_detection::decision::Verdict;
+use meshmark_detection::{decision::Verdict, registration::Method};
 
 pub fn registration(report: &Report) -> Markup {
     let r = &report.registration;
     let method = match r.method {
-        "identity" => "from where it lay",
-        "landmarks" => "by features with the same attribute values",
-        _ => "by features of the same shape",
+        Method::Identity => "from where it lay",
+        Method::Landmarks => "by features with the same attribute values",
+        Method::Geometry => "by features of the same shape",
+        Method::Curves => "by the course of its lines",
     };
     let is_found = report.message.is_some();
     let alignment = report.evidence.as_ref().filter(|_| is_found).map(|e| &e.sketch.alignment);
