@@ -64,6 +64,15 @@ impl Ground {
         [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
     }
 
+    /// Returns where places, CRS units, lie after displacements in metres.
+    pub fn displaced(&self, places: &[[f64; 2]], displacement_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let displaced = |(p, d): (&[f64; 2], &[f64; 2])| {
+            let unit_m = self.metres_per_unit(*p);
+            [p[0] + d[0] / unit_m[0], p[1] + d[1] / unit_m[1]]
+        };
+        places.iter().zip(displacement_m).map(displaced).collect()
+    }
+
     /// Returns the factor on x that makes both axes of the mesh coordinates about equal in scale:
     /// 1, or the cosine of the map's middle latitude, rounded to 2⁻²⁰ so that every machine meshes
     /// the same numbers.

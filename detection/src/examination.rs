@@ -41,10 +41,11 @@ pub struct Mark<'a> {
 
 impl Matched<'_> {
     /// Returns whether no more vertices match than by chance, and, for the joint demodulator, lines
-    /// show no more corners than by chance; demodulation is impossible then.
+    /// show no more corners than by chance and no deformation can be followed; demodulation is
+    /// impossible then.
     pub fn is_chance(&self, demodulator: Demodulator) -> bool {
-        let is_read_by_corners = || demodulator == Demodulator::Joint && observations::corners_show(self);
-        self.is_chance_of_vertices() && !is_read_by_corners()
+        let is_followed = || observations::corners_show(self) || self.grown().is_some();
+        self.is_chance_of_vertices() && !(demodulator == Demodulator::Joint && is_followed())
     }
 
     /// Demodulates with a key. The paper's demodulator uses the matches unchanged; the joint one
@@ -83,10 +84,8 @@ impl Matched<'_> {
             return Ok(self.demodulated(found, matches, None, weights, Observations::Vertices));
         }
         listener(Progress::Stage { stage: "deformation", steps: 0 });
-        let maps = (self.reference.data, self.suspect);
-        let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
         let carriers = self.reference.carriers;
-        let followed = tracking.follow(carriers, parameters, self.radius)?;
+        let followed = Tracking::new(self).follow(carriers, parameters)?;
         let (followed, observations) = observations::choose(self, followed, carriers, parameters, given)?;
         let Followed { radius, matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });

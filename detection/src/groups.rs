@@ -9,8 +9,6 @@ use meshmark_core::map_data::MapData;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Groups are looked for within this distance, metres.
-pub const REACH_M: f64 = 7.0;
 /// Votes this near each other, metres on either axis, are for the same shift.
 const CELL_M: f64 = 0.5;
 /// The vertices of a group that must agree on a shift.
@@ -22,14 +20,15 @@ const CLEARLY_NEARER: f64 = 1.5;
 const MOST_VERTICES: usize = 64;
 const MOST_NEIGHBOURS: usize = 128;
 
-/// Returns the shift of every reference vertex with its polygon group, metres; `None` where there
-/// is no group or its shift is unclear.
-pub fn shifts_m(reference: &MapData, near: &Near) -> Vec<Option<[f64; 2]>> {
+/// Returns the shift of every reference vertex with its polygon group, at most `reach_m`, metres;
+/// `None` where there is no group or its shift is unclear.
+pub fn shifts_m(reference: &MapData, near: &Near, reach_m: f64) -> Vec<Option<[f64; 2]>> {
     let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     (0..).zip(&reference.polygon_roots).for_each(|(v, &root)| groups.entry(root).or_default().push(v));
     groups.retain(|_, vertices| vertices.len() >= LEAST_VERTICES);
     let groups: Vec<Vec<u32>> = groups.into_values().collect();
-    let shifts: Vec<Option<[f64; 2]>> = groups.par_iter().map(|vertices| shift_m(vertices, near)).collect();
+    let shifts: Vec<Option<[f64; 2]>> =
+        groups.par_iter().map(|vertices| shift_m(vertices, near, reach_m)).collect();
     let mut of_vertex = vec![None; reference.vertices.len()];
     for (vertices, shift) in groups.iter().zip(shifts) {
         vertices.iter().for_each(|&vertex| of_vertex[vertex as usize] = shift);
@@ -38,10 +37,10 @@ pub fn shifts_m(reference: &MapData, near: &Near) -> Vec<Option<[f64; 2]>> {
 }
 
 /// Returns the shift on which the vertices of a group agree.
-fn shift_m(vertices: &[u32], near: &Near) -> Option<[f64; 2]> {
+fn shift_m(vertices: &[u32], near: &Near, reach_m: f64) -> Option<[f64; 2]> {
     let step = vertices.len().div_ceil(MOST_VERTICES);
     let asked: Vec<Vec<[f64; 2]>> =
-        vertices.iter().step_by(step).map(|&v| near.displacements_m(v, REACH_M, MOST_NEIGHBOURS)).collect();
+        vertices.iter().step_by(step).map(|&v| near.displacements_m(v, reach_m, MOST_NEIGHBOURS)).collect();
     let needed = ((LEAST_SHARE * asked.len() as f64).ceil() as usize).max(LEAST_VERTICES);
     let mut peaks: Vec<(usize, [f64; 2])> = cells(&asked)
         .into_iter()
@@ -126,7 +125,7 @@ mod tests {
         let moved: Vec<[f64; 2]> = (coords.iter().zip(&town.polygon_roots))
             .map(|(p, &root)| [p[0] + shift(root)[0], p[1] + shift(root)[1]])
             .collect();
-        let found = shifts_m(&town, &Near::new(&matcher, &moved));
+        let found = shifts_m(&town, &Near::new(&matcher, &moved), 7.0);
         let right = |(found, &root): (&Option<[f64; 2]>, &u32)| {
             found.is_some_and(|f| length([f[0] - shift(root)[0], f[1] - shift(root)[1]]) < 0.01)
         };
@@ -136,7 +135,7 @@ mod tests {
         let scatter =
             |i: usize| [0, 1].map(|a| coords[i][a] + ((i * (31 + 16 * a)) % 101) as f64 / 17.0 - 3.0);
         let scattered: Vec<[f64; 2]> = (0..coords.len()).map(scatter).collect();
-        let found = shifts_m(&town, &Near::new(&matcher, &scattered));
+        let found = shifts_m(&town, &Near::new(&matcher, &scattered), 7.0);
         assert!(found.iter().flatten().count() < 50, "{}", found.iter().flatten().count());
     }
 }

@@ -54,6 +54,7 @@ pub mod decision;
 mod edges;
 mod examination;
 mod groups;
+mod growth;
 mod histogram;
 mod linework;
 mod matched;

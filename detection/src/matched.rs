@@ -1,12 +1,18 @@
 //! A reference and a registered suspect whose vertices are matched.
 
 use crate::{
+    growth::Growth,
     matching::{Matcher, Matches, Radius, RadiusChoice, by_chance, is_chance},
-    registration::Registration,
+    registration::{Registration, place_pairs},
 };
 use meshmark_core::{
     Result, ground::Ground, map::Map, map_data::MapData, options::Parameters, patches::Patches,
 };
+use rstar::{AABB, Envelope};
+use std::sync::OnceLock;
+
+/// Above this share of found vertices most are found.
+const MOST_FOUND: f64 = 0.7;
 
 /// The map before marking.
 pub struct Reference<'a> {
@@ -46,6 +52,10 @@ pub struct Matched<'a> {
     pub matches: Matches,
     /// Number of vertices that match after the suspect is shifted out of place.
     pub by_chance: usize,
+    /// The registration of the suspect.
+    pub(crate) registration: Registration,
+    /// What [`Matched::grown`] returns.
+    grown: OnceLock<Option<Vec<[f64; 2]>>>,
 }
 
 impl<'a> Matched<'a> {
@@ -57,7 +67,7 @@ impl<'a> Matched<'a> {
         radius: RadiusChoice,
     ) -> Self {
         let moved = registration.apply(suspect.vertices.coords());
-        Self::of_moved(reference, suspect, moved, |matcher, moved, unit_m| {
+        Self::of_moved(reference, (suspect, registration), moved, |matcher, moved, unit_m| {
             radius.choose(matcher, moved, unit_m)
         })
     }
@@ -65,7 +75,7 @@ impl<'a> Matched<'a> {
     /// Matches the vertices of a suspect at these places, CRS units of the reference.
     pub(crate) fn of_moved(
         reference: &'a Reference<'a>,
-        suspect: &'a MapData,
+        (suspect, registration): (&'a MapData, &Registration),
         moved: Vec<[f64; 2]>,
         radius: impl FnOnce(&Matcher, &[[f64; 2]], [f64; 2]) -> Radius,
     ) -> Self {
@@ -75,7 +85,39 @@ impl<'a> Matched<'a> {
         let radius = radius(&matcher, &moved, unit_m);
         let matches = matcher.all(&moved, radius.metres);
         let by_chance = by_chance(&matcher, &moved, unit_m, radius.metres).0.count;
-        Matched { reference, suspect, moved, radius, matches, by_chance }
+        let registration = registration.clone();
+        Matched {
+            reference,
+            suspect,
+            moved,
+            radius,
+            matches,
+            by_chance,
+            registration,
+            grown: OnceLock::new(),
+        }
+    }
+
+    /// Returns the places to which a strong smooth deformation takes the reference vertices, CRS
+    /// units; `None` where there is none that can be followed.
+    pub(crate) fn grown(&self) -> Option<&[[f64; 2]]> {
+        let Reference { data, ground, .. } = self.reference;
+        self.grown
+            .get_or_init(|| {
+                let place = |place: [f64; 2]| self.registration.apply(&[place])[0];
+                let pairs = place_pairs(data, self.suspect).into_iter().map(|[s, r]| [place(s), r]);
+                Growth::new(data, ground, pairs.collect()).grow(&self.moved)
+            })
+            .as_deref()
+    }
+
+    /// Returns whether most reference vertices in the extent of the suspect are among `found` ones.
+    pub(crate) fn is_mostly_found(&self, found: usize) -> bool {
+        let mut extent = AABB::new_empty();
+        self.moved.iter().for_each(|place| extent.merge(&AABB::from_point(*place)));
+        let coords = self.reference.data.vertices.coords();
+        let there = coords.iter().filter(|place| extent.contains_point(place)).count();
+        found as f64 >= MOST_FOUND * there as f64
     }
 
     /// Returns whether no more vertices match than by chance.

@@ -12,7 +12,6 @@ use meshmark_core::{
     deformation::{Deformation, Observed, Prediction, mark_deviation_m},
     options::Parameters,
 };
-use rstar::{AABB, Envelope};
 use serde::Serialize;
 
 /// What the displacements of the reference vertices were observed on.
@@ -32,8 +31,6 @@ const REACH_M: f64 = 1.5;
 const QUIET_M: f64 = 0.1;
 /// The size of a house, metres.
 const HOUSE_M: f64 = 10.0;
-/// Vertices of which more than this share is found need no corners, while their noise is quiet.
-const MOST_FOUND: f64 = 0.7;
 /// Information beyond this accuracy counts no more, metres.
 const LEAST_NOISE_M: f64 = 0.03;
 /// A matched vertex within this distance of the corner is that corner, metres.
@@ -61,7 +58,10 @@ pub fn choose(
 ) -> Result<(Followed, Observations)> {
     let is_plain = match given {
         Some(kind) => kind == Observations::Vertices,
-        None => is_quiet(&followed.disturbance.deformation) && is_mostly_found(matched, &followed),
+        None => {
+            let found = followed.observed.iter().flatten().count();
+            is_quiet(&followed.disturbance.deformation) && matched.is_mostly_found(found)
+        }
     };
     if is_plain {
         return Ok((followed, Observations::Vertices));
@@ -170,16 +170,6 @@ fn information(observed: &Observed, disturbance: &Prediction) -> f64 {
 /// explains nothing.
 fn is_quiet(Deformation { deviation_m, range_m, noise_m, .. }: &Deformation) -> bool {
     *noise_m < QUIET_M && (*deviation_m < QUIET_M || *range_m > HOUSE_M)
-}
-
-/// Returns whether most reference vertices in the extent of the suspect were found.
-fn is_mostly_found(matched: &Matched, followed: &Followed) -> bool {
-    let mut extent = AABB::new_empty();
-    matched.moved.iter().for_each(|place| extent.merge(&AABB::from_point(*place)));
-    let coords = matched.reference.data.vertices.coords();
-    let there = coords.iter().filter(|place| extent.contains_point(place)).count();
-    let found = followed.observed.iter().flatten().count();
-    found as f64 >= MOST_FOUND * there as f64
 }
 
 #[cfg(test)]

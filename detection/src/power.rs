@@ -62,7 +62,10 @@ impl Power {
             displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
         let linework = Linework::new(matched.reference.data, &matched.reference.ground);
         let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
-        let trial = Matched::of_moved(matched.reference, matched.suspect, moved, |_, _, _| matched.radius);
+        let trial = {
+            let suspect = (matched.suspect, &matched.registration);
+            Matched::of_moved(matched.reference, suspect, moved, |_, _, _| matched.radius)
+        };
         if trial.is_chance(demodulator) {
             return Ok(Power::Trial(0.0));
         }

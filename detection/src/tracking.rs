@@ -2,6 +2,7 @@
 
 use crate::{
     groups,
+    matched::Matched,
     matching::{Graph, LEAST_MATCHED, Matcher, Matches, Near, Radius, RadiusChoice, RadiusReason},
 };
 use meshmark_core::{
@@ -10,9 +11,14 @@ use meshmark_core::{
     ground::Ground,
     map_data::MapData,
     options::Parameters,
-    patches::Patches,
 };
 
+/// Polygon groups are looked for as a whole within this distance, metres.
+const GROUPS_M: f64 = 7.0;
+/// A radius of so many metres matches many wrong vertices, which may hide a strong deformation.
+const FAR_M: f64 = 4.0;
+/// A strong deformation is taken where it keeps this many times the segments.
+const KEEPS_MORE: f64 = 1.1;
 /// Number of rounds in which vertices are matched around the predicted deformation.
 const ROUNDS: usize = 3;
 
@@ -23,10 +29,7 @@ const CLEARLY_MORE: f64 = 1.5;
 /// deformation, and the deformation predicts the places of more matches. The key is not involved,
 /// so decoys have the same input.
 pub struct Tracking<'a> {
-    reference: &'a MapData,
-    moved: &'a [[f64; 2]],
-    ground: &'a Ground,
-    patches: &'a Patches,
+    matched: &'a Matched<'a>,
     /// Graphs of the reference and of the suspect.
     graphs: [Graph; 2],
 }
@@ -44,66 +47,96 @@ pub struct Followed {
 }
 
 impl<'a> Tracking<'a> {
-    /// Prepares a reference and its suspect; `moved` are the vertices of the suspect in reference
-    /// coordinates.
-    pub fn new(
-        (reference, suspect): (&'a MapData, &MapData),
-        moved: &'a [[f64; 2]],
-        ground: &'a Ground,
-        patches: &'a Patches,
-    ) -> Self {
-        let graphs = [reference, suspect].map(|map| Graph::new(map.vertices.len(), &map.segments));
-        Tracking { reference, moved, ground, patches, graphs }
+    /// Prepares a reference and its suspect.
+    pub fn new(matched: &'a Matched<'a>) -> Self {
+        let graph = |map: &MapData| Graph::new(map.vertices.len(), &map.segments);
+        Tracking { matched, graphs: [graph(matched.reference.data), graph(matched.suspect)] }
     }
 
     /// Matches until the deformation is found, where `carriers` coefficients of a patch and axis
     /// carry the mark. Where noise moved vertices beyond the least radius, polygon groups may have
-    /// moved as a whole; the start that gives more information about a mark is taken.
+    /// moved as a whole, and where few are found a strong deformation may have moved them; the
+    /// start that gives most information about a mark is taken.
     ///
     /// # Errors
     /// Returns the errors of the estimation.
-    pub fn follow(&self, carriers: usize, parameters: &Parameters, radius: Radius) -> Result<Followed> {
-        let fit = Fit { tracking: self, carriers, parameters };
-        let coords = self.reference.vertices.coords();
-        let plain = fit.follow(coords, radius)?;
-        if radius.reason != RadiusReason::Noise {
-            return Ok(plain);
+    pub fn follow(&self, carriers: usize, parameters: &Parameters) -> Result<Followed> {
+        let (fit, radius) = (Fit { tracking: self, carriers, parameters }, self.matched.radius);
+        let mut best = fit.follow(self.reference().vertices.coords(), radius)?;
+        if radius.reason == RadiusReason::Noise
+            && let Some(expected) = self.shifted_groups()
+        {
+            let next = fit.follow(&expected, self.radius_around(&expected, RadiusReason::Groups))?;
+            if next.information() > CLEARLY_MORE * best.information() {
+                best = next;
+            }
         }
-        let matcher = Matcher::new(coords, self.ground, self.reference.vertices.centre());
-        let shifts = groups::shifts_m(self.reference, &Near::new(&matcher, self.moved));
-        if shifts.iter().flatten().count() < LEAST_MATCHED {
-            return Ok(plain);
+        let is_far = radius.metres >= FAR_M || !self.matched.is_mostly_found(best.matches.count);
+        if radius.reason != RadiusReason::Given
+            && is_far
+            && let Some(expected) = self.matched.grown()
+        {
+            let next = fit.follow(expected, self.radius_around(expected, RadiusReason::Deformation))?;
+            if self.kept_segments(&next) > KEEPS_MORE * self.kept_segments(&best) {
+                best = next;
+            }
         }
-        let shifts: Vec<[f64; 2]> = shifts.into_iter().map(Option::unwrap_or_default).collect();
-        let expected = self.shifted(&shifts);
-        let centre = self.reference.vertices.centre();
-        let matcher = Matcher::new(&expected, self.ground, centre);
-        let unit_m = self.ground.metres_per_unit(centre);
-        let radius = RadiusChoice::FromData.choose(&matcher, self.moved, unit_m);
-        let grouped = fit.follow(&expected, Radius { reason: RadiusReason::Groups, ..radius })?;
-        Ok(if grouped.information() > CLEARLY_MORE * plain.information() { grouped } else { plain })
+        Ok(best)
     }
 
-    /// Returns the places of the reference vertices after these displacements, CRS units.
-    fn shifted(&self, displacement_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let shifted = |(p, d): (&[f64; 2], &[f64; 2])| {
-            let unit = self.ground.metres_per_unit(*p);
-            [p[0] + d[0] / unit[0], p[1] + d[1] / unit[1]]
+    /// Returns the number of segments of the reference whose ends match ends of a segment of the
+    /// suspect. Wrong matches keep few, however well a deformation explains them.
+    fn kept_segments(&self, followed: &Followed) -> f64 {
+        let [_, suspect] = &self.graphs;
+        let matches = &followed.matches.suspect_of;
+        let is_kept = |segment: &&[u32; 2]| {
+            let [a, b] = segment.map(|vertex| matches[vertex as usize]);
+            a.zip(b).is_some_and(|(a, b)| suspect.is_joined(a, b))
         };
-        let coords = self.reference.vertices.coords().iter();
-        coords.zip(displacement_m).map(shifted).collect()
+        self.reference().segments.iter().filter(is_kept).count() as f64
+    }
+
+    fn reference(&self) -> &MapData {
+        self.matched.reference.data
+    }
+
+    fn ground(&self) -> &Ground {
+        &self.matched.reference.ground
+    }
+
+    fn matcher<'b>(&'b self, places: &'b [[f64; 2]]) -> Matcher<'b> {
+        Matcher::new(places, self.ground(), self.reference().vertices.centre())
+    }
+
+    /// Returns the places of the reference vertices, CRS units, after their polygon groups were
+    /// shifted; `None` where too few groups are found.
+    fn shifted_groups(&self) -> Option<Vec<[f64; 2]>> {
+        let coords = self.reference().vertices.coords();
+        let matcher = self.matcher(coords);
+        let shifts = groups::shifts_m(self.reference(), &Near::new(&matcher, &self.matched.moved), GROUPS_M);
+        if shifts.iter().flatten().count() < LEAST_MATCHED {
+            return None;
+        }
+        let shifts: Vec<[f64; 2]> = shifts.into_iter().map(Option::unwrap_or_default).collect();
+        Some(self.ground().displaced(coords, &shifts))
+    }
+
+    /// Returns the matching radius around expected places of the reference vertices.
+    fn radius_around(&self, expected: &[[f64; 2]], reason: RadiusReason) -> Radius {
+        let unit_m = self.ground().metres_per_unit(self.reference().vertices.centre());
+        let matcher = self.matcher(expected);
+        Radius { reason, ..RadiusChoice::FromData.choose(&matcher, &self.matched.moved, unit_m) }
     }
 
     /// Matches with the expected places of the reference vertices, CRS units.
     fn match_joined(&self, expected: &[[f64; 2]], radius_m: f64) -> Matches {
-        let matcher = Matcher::new(expected, self.ground, self.reference.vertices.centre());
-        matcher.joined(self.moved, radius_m, self.graphs.each_ref())
+        self.matcher(expected).joined(&self.matched.moved, radius_m, self.graphs.each_ref())
     }
 
     /// Returns the displacement of every reference vertex, metres; `None` where no suspect vertex
     /// matches.
     fn displacements(&self, matches: &Matches) -> Vec<Option<[f64; 2]>> {
-        matches.displacements_m(self.reference.vertices.coords(), self.moved, self.ground)
+        matches.displacements_m(self.reference().vertices.coords(), &self.matched.moved, self.ground())
     }
 }
 
@@ -119,7 +152,7 @@ impl Fit<'_> {
     /// those that the fitted disturbance predicts.
     fn follow(&self, expected: &[[f64; 2]], radius: Radius) -> Result<Followed> {
         let Fit { tracking, carriers, parameters } = *self;
-        let (patches, amplitude_m) = (tracking.patches, parameters.amplitude_m);
+        let (patches, amplitude_m) = (&tracking.matched.reference.patches, parameters.amplitude_m);
         let mut matches = tracking.match_joined(expected, radius.metres);
         let mut observed = tracking.displacements(&matches);
         let mut round = 1;
@@ -137,14 +170,17 @@ impl Fit<'_> {
                     prediction.shape_noise(patches, &observed, carriers, amplitude_m);
                 return Ok(Followed { radius, matches, observed, disturbance });
             }
-            matches = tracking.match_joined(&tracking.shifted(&prediction.displacement_m), radius.metres);
+            let coords = tracking.reference().vertices.coords();
+            let expected = tracking.ground().displaced(coords, &prediction.displacement_m);
+            matches = tracking.match_joined(&expected, radius.metres);
             observed = tracking.displacements(&matches);
             round += 1;
         }
     }
 
     fn predict(&self, observed: &Observed) -> Result<Prediction> {
-        let Fit { tracking: Tracking { patches, .. }, carriers, parameters } = *self;
+        let Fit { tracking, carriers, parameters } = *self;
+        let patches = &tracking.matched.reference.patches;
         let deformation = Deformation::estimate(patches, observed, carriers, parameters)?;
         Ok(deformation.predict(patches, observed, carriers, parameters.amplitude_m))
     }

@@ -33,6 +33,11 @@ impl Graph {
         Graph { starts, neighbours }
     }
 
+    /// Returns whether a segment joins two vertices.
+    pub(crate) fn is_joined(&self, a: u32, b: u32) -> bool {
+        self.neighbours(a).contains(&b)
+    }
+
     fn neighbours(&self, vertex: u32) -> &[u32] {
         let v = vertex as usize;
         &self.neighbours[self.starts[v] as usize..self.starts[v + 1] as usize]

@@ -42,6 +42,9 @@ pub enum RadiusReason {
     Noise,
     /// Polygon groups were shifted as a whole, and vertices match around their shifted places.
     Groups,
+    /// A strong deformation was followed, and vertices match around the places to which it took
+    /// them.
+    Deformation,
 }
 
 impl RadiusChoice {

@@ -19,8 +19,18 @@ mod search;
 mod similarity;
 mod windows;
 
+use meshmark_core::map_data::MapData;
+
 pub use affine::Affine;
 pub use cubic::{Cubic, TERMS, Transform};
 pub use registrar::Registrar;
 pub use result::{Method, ReadAs, Registration};
 pub use search::Start;
+
+/// Returns places of features in suspect and reference, each in its own CRS units, that have equal
+/// attribute values or shapes.
+pub(crate) fn place_pairs(reference: &MapData, suspect: &MapData) -> Vec<[[f64; 2]; 2]> {
+    let by_value = landmarks::pairs(&reference.labels, &suspect.labels);
+    let by_shape = polylines::pairs(&reference.polylines, &suspect.polylines);
+    [by_value, by_shape].concat()
+}

@@ -78,6 +78,7 @@ impl Report {
             RadiusReason::Given | RadiusReason::Least => "",
             RadiusReason::Noise => " (the least radius that holds those displaced by noise)",
             RadiusReason::Groups => " of places to which their polygon groups were shifted",
+            RadiusReason::Deformation => " of places to which a deformation took them",
         }
     }
 
