@@ -1,6 +1,7 @@
 //! The command line: it turns flags into an exit code.
 
 mod arguments;
+mod command_line;
 mod request;
 
 use crate::package_files;
@@ -11,9 +12,10 @@ use meshmark_verifier::{
     Error, ExitCode, Result,
     compare::{Comparison, compare, detail::ComparedFiles},
     distribute, html,
-    inputs::{digests::Inputs, gdal_failures, texts},
+    inputs::{digests::Inputs, gdal_failures, texts, versions::versions},
+    outputs::{EvidenceMapFile, Format, ReportFile},
     progress::Progress,
-    report::{self, EvidenceMapFile, Format, Provenance, Report, ReportFile},
+    report::{self, Provenance, Report},
     verify,
     verify::with_reference_of_record,
     verify_records,
@@ -96,7 +98,7 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let provenance = file
         .as_ref()
-        .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line()))
+        .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line::own()))
         .transpose()?;
     let mut comparison =
         compare(&args.reference, &args.marked, layers.as_deref(), args.precision, file.is_some())?;
@@ -151,7 +153,7 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
         None => verify(&with_reference_of_record(&request, &references, &mut progress)?, &mut progress)?,
     };
     if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
-        map.write(&target)?;
+        target.write(&map)?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
     print(&if json { report.to_json() } else { report.to_text() })?;
@@ -169,8 +171,8 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
             inputs,
             reference_vertices_sha256: report.reference_digest.clone(),
             suspect_crs: report.suspect_crs.clone(),
-            command: command_line(),
-            versions: report::versions(),
+            command: command_line::own(),
+            versions: versions(),
         };
         let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
         file.write(&match file.format() {
@@ -179,9 +181,4 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
         })?;
     }
     Ok(report.exit_code())
-}
-
-/// Returns the command line of this process.
-fn command_line() -> String {
-    report::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }

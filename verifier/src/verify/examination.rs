@@ -2,6 +2,7 @@
 
 use super::{
     crs_search::{self, Registered},
+    drawing,
     request::Request,
 };
 use crate::{
@@ -11,10 +12,7 @@ use crate::{
         suspects::{self, Suspect},
     },
     progress::Progress,
-    report::{
-        EvidenceMap, VertexCounts,
-        sketch::{Scene, Sketch},
-    },
+    report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
 use meshmark_core::demodulation::Demodulation;
 use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
@@ -183,9 +181,9 @@ fn seen(
     let reference = &matched.reference.data.vertices;
     let suspect = matched.suspect.vertices.len();
     let vertices = VertexCounts { reference: reference.len(), suspect, matched: matches.count };
-    let scene = Scene { matched, matches, demodulated: demodulated.as_ref() };
-    let sketch = request.sketch.then(|| scene.sketch(&registration));
-    let evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene, crs));
+    let scene = drawing::Scene { matched, matches, demodulated: demodulated.as_ref() };
+    let sketch = request.sketch.then(|| drawing::sketch(&scene, &registration));
+    let evidence_map = request.evidence_map.then(|| drawing::evidence_map(&scene, crs));
     let observations = demodulated.as_ref().map(|demodulated| demodulated.observations);
     let (found, decoys) = match demodulated {
         Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),

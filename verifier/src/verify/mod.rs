@@ -10,6 +10,7 @@
 mod belonging;
 mod conclusion;
 mod crs_search;
+mod drawing;
 mod examination;
 mod records;
 mod references;
