@@ -436,7 +436,7 @@ mod tests {
     fn capacity_counts_the_mean_as_taken() {
         let cut = Patches::new(&Map::of_points(&scattered(600), METRES), &size(300)).unwrap();
         let p = Parameters { code: Code::Repetition, chip_rate: 1, ..Parameters::default() };
-        assert_eq!(cut.carriers(299, &p), Ok(299));
+        assert_eq!(cut.carriers(299, &p).unwrap(), 299);
         assert!(cut.carriers(300, &p).unwrap_err().to_string().contains("has 299"));
     }
 

@@ -245,6 +245,9 @@ impl Distribution {
     pub fn survives(&self, fault: Fault) -> usize {
         let failed = self.run(Some(fault));
         let context = format!("{fault:?}: {:?} {}", failed.code, failed.stderr);
+        if matches!(fault, Fault::FullDisk(_) | Fault::FileSize(_)) {
+            assert!(matches!(failed.code, Some(0 | 5 | 7)), "a full disk is not the user's: {context}");
+        }
         let is_main =
             |name: &String| !name.starts_with('.') && [".gpkg", ".shp"].iter().any(|e| name.ends_with(e));
         let there = if self.host.path("out").is_dir() { self.contents() } else { Vec::new() };

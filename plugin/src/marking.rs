@@ -88,7 +88,7 @@ impl MarkingRequest {
 fn pool(threads: usize) -> Result<ThreadPool> {
     // GEOS reports the faults of invalid geometries on the calling thread.
     let pool = ThreadPool::new(threads, ffi_errors::hush, ffi_errors::unhush);
-    pool.map_err(|error| Error::Threads(error.to_string()))
+    pool.map_err(Error::Threads)
 }
 
 fn read_key(path: &str) -> Result<SecretKey> {

@@ -18,6 +18,6 @@ mod thinning;
 pub mod verify;
 pub mod words;
 
-pub use error::{Error, Result};
+pub use error::{Cause, Error, Result};
 pub use exit_code::ExitCode;
 pub use verify::{Request, verify, verify_records};

@@ -62,14 +62,14 @@ fn print(text: &str) -> Result<()> {
 
 fn keygen(path: &PathBuf) -> Result<()> {
     let mut secret = zeroize::Zeroizing::new([0; 32]);
-    getrandom::fill(secret.as_mut_slice()).map_err(|error| Error::Random { reason: error.to_string() })?;
+    getrandom::fill(secret.as_mut_slice()).map_err(|source| Error::Random { source })?;
     let key = SecretKey::from_bytes(*secret);
     let failed = |error: std::io::Error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Exists {
             path: path.clone(),
             remedy: ", and a key is never overwritten: name another file",
         },
-        _ => Error::Unwritten { what: format!("the key file {}", path.display()), source: error, remedy: "" },
+        _ => Error::unwritten(format!("the key file {}", path.display()), error),
     };
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create_new(true);
@@ -88,7 +88,7 @@ fn keygen(path: &PathBuf) -> Result<()> {
 fn write_package_files(folder: &Path) -> Result<()> {
     package_files::write(Cli::command(), folder).map_err(|source| {
         let what = format!("the folder {} for man pages and completions", folder.display());
-        Error::Unwritten { what, source, remedy: "" }
+        Error::unwritten(what, source)
     })?;
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Maps: references, and maps that are marked or compared.
 
-use super::gdal_failures::{forget_failure, last_failure};
+use super::gdal_failures::{GdalFailure, forget_failure, last_failure};
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{ground::Ground, options::Options, scale::ScaleLattice};
@@ -92,16 +92,15 @@ fn open(what: &'static str, path: &Path) -> Result<Dataset> {
     if holds_password(path) {
         return Err(Error::Password { what });
     }
-    open_with(path, None, &[]).map_err(|reason| Error::Unopened { what, path: path.into(), reason })
+    open_with(path, None, &[]).map_err(|source| Error::Unopened { what, path: path.into(), source })
 }
 
 /// Opens a dataset with these drivers, all without names, and with open options beside the usual ones.
-/// The error is GDAL's reason.
 pub(super) fn open_with(
     path: &Path,
     allowed_drivers: Option<&[&str]>,
     options: &[String],
-) -> std::result::Result<Dataset, String> {
+) -> std::result::Result<Dataset, GdalFailure> {
     forget_failure();
     let mut open_options = marking::OPEN_OPTIONS.to_vec();
     open_options.push("@WRITE_GFS=NO"); // reading a map creates no file beside it
@@ -112,7 +111,7 @@ pub(super) fn open_with(
         allowed_drivers,
         ..Default::default()
     };
-    Dataset::open_ex(path, options).map_err(|error| last_failure().unwrap_or_else(|| error.to_string()))
+    Dataset::open_ex(path, options).map_err(GdalFailure::new)
 }
 
 /// Returns whether the connection string of a database holds its password: as `password=…`, `pwd=…`

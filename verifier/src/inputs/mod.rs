@@ -9,4 +9,5 @@ pub mod suspects;
 mod svg;
 mod tables;
 pub mod texts;
+pub mod unsuitable;
 pub mod versions;

@@ -1,10 +1,11 @@
 //! Suspects, which may be manipulated: only local files of plain formats are read, without network.
 
 use super::{
+    gdal_failures::GdalFailure,
     maps::{Reading, failed, first_crs, open_with, read, survey_of},
     suspect_formats, svg, tables,
 };
-use crate::{Error, Result, words::printable};
+use crate::{Cause, Error, Result, words::printable};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_dataset::{CoordinateSystem, Survey, TargetCrs};
 use std::{
@@ -53,14 +54,14 @@ fn open_suspect(path: &Path) -> Result<Dataset> {
     if !path.is_file() && !path.is_dir() {
         return Err(Error::NoFile { path: path.into() });
     }
-    forbid_network().map_err(|error| Error::NoOption { reason: error.to_string() })?;
+    forbid_network().map_err(|source| Error::NoOption { source })?;
     check_table(path)?;
     suspect_formats::check(path)?;
     if svg::is_named(path) {
         return svg::open(path);
     }
     let place = highest_zoom(path).unwrap_or_else(|| path.into());
-    let dataset = open_plain(&place, &[]).map_err(|reason| suspect_formats::unopened(path, &reason))?;
+    let dataset = open_plain(&place, &[]).map_err(|failure| suspect_formats::unopened(path, failure))?;
     check_plain(path, &dataset)?;
     if dataset.driver().short_name() == "CSV" && tables::is_without_geometry(&dataset) {
         return open_table(path, &dataset);
@@ -68,7 +69,7 @@ fn open_suspect(path: &Path) -> Result<Dataset> {
     Ok(dataset)
 }
 
-fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, String> {
+fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, GdalFailure> {
     open_with(path, Some(&suspect_formats::drivers()), options)
 }
 
@@ -76,7 +77,7 @@ fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, S
 fn open_table(path: &Path, table: &Dataset) -> Result<Dataset> {
     let options =
         tables::open_options(table).ok_or_else(|| suspect_formats::table_without_coordinates(path))?;
-    open_plain(path, &options).map_err(|reason| suspect_formats::unopened(path, &reason))
+    open_plain(path, &options).map_err(|failure| suspect_formats::unopened(path, failure))
 }
 
 /// Returns the folder of the highest zoom of a folder of tiles, named z/x/y.pbf.
@@ -145,10 +146,10 @@ const VIRTUAL_TABLES: &str = "SELECT name, sql FROM sqlite_master WHERE sql LIKE
 
 /// Refuses a database with virtual tables that take their rows from elsewhere.
 fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
-    let failed = |reason: String| Error::Unread { path: path.into(), reason };
+    let failed = |cause: Cause| Error::Unread { path: path.into(), source: Box::new(cause) };
     let tables = match dataset.driver().short_name().as_str() {
-        "GPKG" | "SQLite" => virtual_tables(dataset).map_err(|error| failed(error.to_string()))?,
-        "MBTiles" => virtual_tables_of_tiles(path).map_err(|error| failed(error.to_string()))?,
+        "GPKG" | "SQLite" => virtual_tables(dataset).map_err(|error| failed(error.into()))?,
+        "MBTiles" => virtual_tables_of_tiles(path).map_err(|error| failed(error.into()))?,
         _ => return Ok(()),
     };
     match tables.into_iter().find(|(_, sql)| !is_plain(sql)) {

@@ -1,6 +1,6 @@
 //! The evidence map as a GeoPackage, which appears completely or not at all.
 
-use crate::{Error, Result, report::EvidenceMap};
+use crate::{Cause, Error, Result, report::EvidenceMap};
 use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
@@ -41,14 +41,13 @@ impl EvidenceMapFile {
     /// # Errors
     /// Fails when the file cannot be written, and when it exists by now.
     pub fn write(&self, map: &EvidenceMap) -> Result<()> {
-        let failed = |reason: String| self.failed(&reason);
         let workplace = workplace(&self.path)?;
         let staged = workplace.path().join("map.gpkg");
-        write_layers(map, &staged).map_err(|error| failed(error.to_string()))?;
-        let staged = TempPath::try_from_path(staged).map_err(|error| failed(error.to_string()))?;
+        write_layers(map, &staged).map_err(|error| self.failed(error))?;
+        let staged = TempPath::try_from_path(staged).map_err(|error| self.failed(error))?;
         staged.persist_noclobber(&self.path).map_err(|error| match error.error.kind() {
             ErrorKind::AlreadyExists => self.exists(),
-            _ => failed(error.error.to_string()),
+            _ => self.failed(error.error),
         })
     }
 
@@ -56,19 +55,15 @@ impl EvidenceMapFile {
         Error::Exists { path: self.path.clone(), remedy: ": name another file for --evidence-map" }
     }
 
-    fn failed(&self, reason: &str) -> Error {
-        unwritable(&self.path, reason)
+    fn failed(&self, source: impl Into<Cause>) -> Error {
+        Error::unwritten(self.path.display(), source)
     }
 }
 
 /// Creates a private folder beside the file, for its construction.
 fn workplace(path: &Path) -> Result<TempDir> {
     let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder_of(path));
-    workplace.map_err(|error| unwritable(path, &error.to_string()))
-}
-
-fn unwritable(path: &Path, reason: &str) -> Error {
-    Error::NotWritten { what: path.display().to_string(), reason: reason.into() }
+    workplace.map_err(|error| Error::unwritten(path.display(), error))
 }
 
 fn write_layers(map: &EvidenceMap, path: &Path) -> gdal::errors::Result<()> {
