@@ -126,7 +126,7 @@ impl<'a> Work<'a> {
     }
 
     fn run(&self, command: &mut Command, exit_codes: &[i32]) -> Result<Run> {
-        Run::of(command, self.folder.path(), exit_codes)
+        Run::measure(command, self.folder.path(), exit_codes)
     }
 
     /// The path of an output that is not there, so that every run does the same work.

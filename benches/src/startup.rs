@@ -18,7 +18,7 @@ pub fn load_ms(plugins: &Path) -> Result<f64> {
         for (times, plugins) in times.iter_mut().zip([folder.path(), plugins]) {
             let mut command = Command::new("ogrinfo");
             command.arg("--formats").env("GDAL_DRIVER_PATH", plugins).stdout(std::process::Stdio::null());
-            times.push(1e3 * Run::of(&mut command, folder.path(), &[0])?.seconds);
+            times.push(1e3 * Run::measure(&mut command, folder.path(), &[0])?.seconds);
         }
     }
     let [without, with] = times.map(median);

@@ -63,9 +63,9 @@ impl<'a> Tracking<'a> {
     /// # Errors
     /// Returns the errors of the estimation.
     pub fn follow(&self, carriers: usize, parameters: &Parameters, radius: Radius) -> Result<Followed> {
-        let fit = Fit { tracking: self, carriers, parameters };
+        let follower = Follower { tracking: self, carriers, parameters };
         let coords = self.reference.vertices.coords();
-        let plain = fit.follow(coords, radius)?;
+        let plain = follower.follow(coords, radius)?;
         if radius.reason != RadiusReason::Noise {
             return Ok(plain);
         }
@@ -80,7 +80,7 @@ impl<'a> Tracking<'a> {
         let matcher = Matcher::new(&expected, self.ground, centre);
         let unit_m = self.ground.metres_per_unit(centre);
         let radius = RadiusChoice::FromData.choose(&matcher, self.moved, unit_m);
-        let grouped = fit.follow(&expected, Radius { reason: RadiusReason::Groups, ..radius })?;
+        let grouped = follower.follow(&expected, Radius { reason: RadiusReason::Groups, ..radius })?;
         Ok(if grouped.information() > CLEARLY_MORE * plain.information() { grouped } else { plain })
     }
 
@@ -107,18 +107,18 @@ impl<'a> Tracking<'a> {
     }
 }
 
-/// The fit of a disturbance to the displacements of matched vertices.
-struct Fit<'a> {
+/// Follows the disturbance that fits the displacements of matched vertices.
+struct Follower<'a> {
     tracking: &'a Tracking<'a>,
     carriers: usize,
     parameters: &'a Parameters,
 }
 
-impl Fit<'_> {
+impl Follower<'_> {
     /// Matches around the expected places of the reference vertices, CRS units, and then around
     /// those that the fitted disturbance predicts.
     fn follow(&self, expected: &[[f64; 2]], radius: Radius) -> Result<Followed> {
-        let Fit { tracking, carriers, parameters } = *self;
+        let Follower { tracking, carriers, parameters } = *self;
         let (patches, amplitude_m) = (tracking.patches, parameters.amplitude_m);
         let mut matches = tracking.match_joined(expected, radius.metres);
         let mut observed = tracking.displacements(&matches);
@@ -144,7 +144,7 @@ impl Fit<'_> {
     }
 
     fn predict(&self, observed: &Observed) -> Result<Prediction> {
-        let Fit { tracking: Tracking { patches, .. }, carriers, parameters } = *self;
+        let Follower { tracking: Tracking { patches, .. }, carriers, parameters } = *self;
         let deformation = Deformation::estimate(patches, observed, carriers, parameters)?;
         Ok(deformation.predict(patches, observed, carriers, parameters.amplitude_m))
     }

@@ -30,7 +30,7 @@ impl Run {
     ///
     /// # Errors
     /// When it does not start, or ends otherwise: with what it said.
-    pub fn of(command: &mut Command, folder: &Path, exit_codes: &[i32]) -> Result<Self> {
+    pub fn measure(command: &mut Command, folder: &Path, exit_codes: &[i32]) -> Result<Self> {
         let messages = folder.join("messages.txt");
         command.current_dir(folder).stderr(File::create(&messages)?);
         let since = Instant::now();
@@ -129,7 +129,7 @@ mod tests {
     fn a_process_is_waited_for_and_its_failure_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let shell = |script: &str, codes: &[i32]| {
-            Run::of(Command::new("sh").args(["-c", script]), folder.path(), codes)
+            Run::measure(Command::new("sh").args(["-c", script]), folder.path(), codes)
         };
         let run = shell("sleep 0.05", &[0]).unwrap();
         assert!(run.seconds >= 0.05 && run.peak_bytes > 1e5, "{run:?}");

@@ -117,7 +117,7 @@ fn houses(count: usize) -> Vec<[[f64; 2]; 4]> {
 /// Enough for the default patch.
 const MANY: usize = 240;
 
-type Place<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
+type Projection<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
 
 /// Moves and scales metres to the place of a map.
 fn at(origin: [f64; 2], scale: [f64; 2]) -> impl Fn([f64; 2]) -> [f64; 2] {
@@ -129,7 +129,7 @@ fn degrees(lon: f64, lat: f64) -> impl Fn([f64; 2]) -> [f64; 2] {
     at([lon, lat], [1.0 / (111_320.0 * lat.to_radians().cos()), 1.0 / 111_320.0])
 }
 
-fn list(points: &[[f64; 2]], place: Place, more: &str) -> String {
+fn list(points: &[[f64; 2]], place: Projection, more: &str) -> String {
     let text = |&point: &[f64; 2]| {
         let [x, y] = place(point);
         format!("{x:?} {y:?}{more}")
@@ -138,7 +138,7 @@ fn list(points: &[[f64; 2]], place: Place, more: &str) -> String {
 }
 
 /// Houses as polygons.
-fn polygons(place: Place) -> Vec<String> {
+fn polygons(place: Projection) -> Vec<String> {
     houses(MANY)
         .iter()
         .map(|[a, b, c, d]| format!("POLYGON (({}))", list(&[*a, *b, *c, *d, *a], place, "")))

@@ -164,7 +164,7 @@ pub struct Uniformity {
 
 impl Uniformity {
     /// Kolmogorov–Smirnov test with the small-sample factor of Stephens 1970.
-    pub fn of(mut values: Vec<f64>) -> Self {
+    pub fn measure(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;
         let gap = |(i, v): (usize, &f64)| ((i + 1) as f64 / n - v).max(v - i as f64 / n);
@@ -224,7 +224,7 @@ pub fn markdown(samples: &[Sample], seed: u64) -> String {
         "---|".repeat(9)
     );
     let mut row = |name: &str, samples: Vec<&Sample>| {
-        let [keys, recipients] = pooled(samples.into_iter()).map(Uniformity::of);
+        let [keys, recipients] = pooled(samples.into_iter()).map(Uniformity::measure);
         let cells =
             |u: Uniformity| format!("{} | {:.4} | {:.2} | {:.1e}", u.count, u.distance, u.p_value, u.least);
         text += &format!("| {name} | {} | {} |\n", cells(keys), cells(recipients));
@@ -258,11 +258,11 @@ mod tests {
     fn uniform_numbers_pass_and_squares_of_them_do_not() {
         let mut random = Random::new(1);
         let uniform: Vec<f64> = (0..5000).map(|_| random.unit()).collect();
-        assert!(Uniformity::of(uniform.clone()).p_value > 0.01);
-        assert!(Uniformity::of(uniform.iter().map(|u| u * u).collect()).p_value < 1e-9);
+        assert!(Uniformity::measure(uniform.clone()).p_value > 0.01);
+        assert!(Uniformity::measure(uniform.iter().map(|u| u * u).collect()).p_value < 1e-9);
         // Stephens 1970: 1.358 is the 5 % point of (√n + 0.12 + 0.11/√n) D.
         let distance = 1.358 / (10.0 + 0.12 + 0.011);
         let shifted = (1..=100).map(|i| (f64::from(i) / 100.0 - distance).max(0.0)).collect();
-        assert!((Uniformity::of(shifted).p_value - 0.05).abs() < 0.001);
+        assert!((Uniformity::measure(shifted).p_value - 0.05).abs() < 0.001);
     }
 }

@@ -17,7 +17,7 @@ mod search;
 mod windows;
 
 pub use affine::Affine;
-pub use cubic::{Cubic, TERMS, Transform};
+pub use cubic::Cubic;
 pub use registrar::Registrar;
 pub use result::{ReadAs, Registration};
 pub use search::Start;

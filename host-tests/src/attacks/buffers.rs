@@ -35,7 +35,7 @@ pub enum Buffering {
 
 impl Buffering {
     /// What is left of a map.
-    pub fn of(self, map: &Map) -> Map {
+    pub fn apply(self, map: &Map) -> Map {
         map.map_geometries(|geometry| self.of_geometry(geometry)).of_any_type()
     }
 
@@ -83,7 +83,7 @@ mod tests {
     const SHAPES: [&str; 3] = ["POLYGON ((0 0,6 0,6 5,0 5,0 0))", "LINESTRING (20 0,30 0)", "POINT (1 1)"];
 
     fn areas(buffering: Buffering) -> Vec<f64> {
-        buffering.of(&in_memory(&SHAPES)).geometries().map(Area::unsigned_area).collect()
+        buffering.apply(&in_memory(&SHAPES)).geometries().map(Area::unsigned_area).collect()
     }
 
     fn is_close(areas: &[f64], wanted: f64) -> bool {
@@ -105,7 +105,7 @@ mod tests {
     fn out_and_in_fills_notches_and_brings_corners_back() {
         let notched = in_memory(&["POLYGON ((0 0,9 0,9 5,5 5,5 3,4 3,4 5,0 5,0 0))"]);
         for (join, most) in [(Join::Mitre, 8), (Join::Round, 16)] {
-            let filled = Buffering::OutAndIn { distance: 1.0, join }.of(&notched);
+            let filled = Buffering::OutAndIn { distance: 1.0, join }.apply(&notched);
             let area: f64 = filled.geometries().map(Area::unsigned_area).sum();
             assert!((area - 45.0).abs() < 0.3, "{join:?}: {area}");
             let count = filled.vertices().unwrap().len();
@@ -117,7 +117,7 @@ mod tests {
     fn most_buildings_of_a_real_map_survive_the_erosion() {
         let map = fixture("kotka.gpkg");
         let polygons = map.geometries().filter(|geometry| is_polygonal(geometry)).count();
-        let eroded = Buffering::Erode { distance: 0.3 }.of(&map);
+        let eroded = Buffering::Erode { distance: 0.3 }.apply(&map);
         assert!(eroded.features().count() * 100 > polygons * 99);
         let area = |map: &Map| -> f64 { map.geometries().map(Area::unsigned_area).sum() };
         assert!(area(&eroded) < area(&map));

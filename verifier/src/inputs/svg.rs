@@ -141,7 +141,7 @@ impl Drawing {
             if elements > MOST_POINTS || pending.len() > MOST_POINTS {
                 return Err(format!("draws more than {MOST_POINTS} elements").into());
             }
-            let transform = around.then_inner(Affine::of(node));
+            let transform = around.then_inner(Affine::of_node(node));
             match node.tag_name().name() {
                 "svg" | "g" | "a" | "switch" => {
                     pending.extend(node.children().rev().map(|child| (child, transform, uses)));
@@ -290,7 +290,7 @@ impl Affine {
     }
 
     /// Returns the transform of an element; one that is malformed changes nothing.
-    fn of(node: Node) -> Self {
+    fn of_node(node: Node) -> Self {
         let transform = node.attribute("transform").and_then(|text| Transform::from_str(text).ok());
         transform.map_or(Affine::IDENTITY, |Transform { a, b, c, d, e, f }| Affine([a, b, c, d, e, f]))
     }

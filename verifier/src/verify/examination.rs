@@ -56,23 +56,23 @@ pub struct Examination {
 ///
 /// # Errors
 /// Fails when it cannot be read.
-pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Fit<Survey>> {
+pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Suited<Survey>> {
     progress.start("reading", 0);
     let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: request.landmarks(), geometries: false };
     match maps::reference(&request.reference, &reading) {
-        Ok(reference) => Ok(Fit::Fits(reference)),
-        Err(error) if error.is_about_options() => Ok(Fit::Unfit(error)),
+        Ok(reference) => Ok(Suited::Yes(reference)),
+        Err(error) if error.is_about_options() => Ok(Suited::No(error)),
         Err(error) => Err(error),
     }
 }
 
-/// The fit of a reference to a request.
-pub enum Fit<T> {
+/// A value, if the reference is suited to the request.
+pub enum Suited<T> {
     /// A map made from the reference may carry the mark of the request.
-    Fits(T),
+    Yes(T),
     /// The reference does not allow the mark; the error holds the reason.
-    Unfit(Error),
+    No(Error),
 }
 
 impl Examination {
@@ -86,15 +86,15 @@ impl Examination {
     }
 }
 
-impl<T> Fit<T> {
+impl<T> Suited<T> {
     /// Returns the value, for a request that names this very reference.
     ///
     /// # Errors
     /// Fails when the reference does not fit.
     pub fn or_fail(self) -> Result<T> {
         match self {
-            Fit::Fits(found) => Ok(found),
-            Fit::Unfit(error) => Err(error),
+            Suited::Yes(found) => Ok(found),
+            Suited::No(error) => Err(error),
         }
     }
 }
@@ -103,9 +103,13 @@ impl<T> Fit<T> {
 ///
 /// # Errors
 /// Fails when the suspect is unreadable.
-pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Fit<Examination>> {
+pub fn examine(
+    request: &Request,
+    reference: &Survey,
+    progress: &mut Progress,
+) -> Result<Suited<Examination>> {
     let unfit =
-        |source| Fit::Unfit(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
+        |source| Suited::No(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
     let map = match reference.map() {
         Ok(map) => map,
         Err(error) => return Ok(unfit(error)),
@@ -126,7 +130,7 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         Err(error) => return Ok(unfit(error.into())),
     };
     let crs = reference.crs.as_ref();
-    Ok(Fit::Fits(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
+    Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
 }
 
 /// A suspect is read whole, with all its attributes.

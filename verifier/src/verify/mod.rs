@@ -17,7 +17,7 @@ mod references;
 mod request;
 
 pub use belonging::{check_key, check_reference};
-pub use examination::{Examination, Fit, examine, read_reference};
+pub use examination::{Examination, Suited, examine, read_reference};
 pub use records::verify_records;
 pub use references::with_reference_of_record;
 pub use request::Request;

@@ -6,7 +6,7 @@
 use super::{
     belonging::check_key,
     conclusion::conclude,
-    examination::{Examination, Fit, examine, read_reference},
+    examination::{Examination, Suited, examine, read_reference},
     references::is_made_from,
     request::Request,
 };
@@ -170,8 +170,8 @@ fn examine_group(
     for path in references {
         let request = Request { reference: path.clone(), ..group.request.clone() };
         let reference = match read_reference(&request, progress)? {
-            Fit::Fits(reference) => reference,
-            Fit::Unfit(error) => {
+            Suited::Yes(reference) => reference,
+            Suited::No(error) => {
                 other = Some(error.to_string());
                 continue;
             }
@@ -184,8 +184,8 @@ fn examine_group(
             continue;
         }
         match examine(&own.request, &reference, progress)? {
-            Fit::Fits(seen) => examined.push((own, seen)),
-            Fit::Unfit(error) => skip_all(&own, &error.to_string(), skip),
+            Suited::Yes(seen) => examined.push((own, seen)),
+            Suited::No(error) => skip_all(&own, &error.to_string(), skip),
         }
     }
     let reason = match (references, other) {

@@ -1,7 +1,7 @@
 //! Several references, such as the editions of a map: every record finds its own.
 
 use super::{
-    examination::{Fit, read_reference},
+    examination::{Suited, read_reference},
     request::Request,
 };
 use crate::{Error, Result, progress::Progress};
@@ -26,7 +26,7 @@ pub fn with_reference_of_record(
     };
     for path in references {
         let request = Request { reference: path.clone(), ..request.clone() };
-        if let Fit::Fits(reference) = read_reference(&request, progress)?
+        if let Suited::Yes(reference) = read_reference(&request, progress)?
             && is_made_from(record, &reference.data.vertices.digest())
         {
             return Ok(request);
