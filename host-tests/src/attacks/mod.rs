@@ -44,6 +44,7 @@ use outlines::Outline;
 use quantisation::Quantisation;
 use similarity::{About, Matrix};
 use std::sync::Arc;
+use vertices::Simplification;
 
 /// An attack, all lengths in units of the map's CRS.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,8 +138,10 @@ impl Attack {
             Attack::Densify { spacing } => Ok(vertices::densify(map, *spacing)),
             Attack::DrawAnew(redrawing) => Ok(redrawing.draw(map, seed)),
             Attack::Outline(outline) => Ok(outline.apply(map)),
-            Attack::Simplify { tolerance } => Ok(vertices::simplify(map, *tolerance)),
-            Attack::SimplifyByArea { area } => Ok(vertices::simplify_by_area(map, *area)),
+            Attack::Simplify { tolerance } => {
+                Ok(vertices::simplify(map, Simplification::Distance(*tolerance)))
+            }
+            Attack::SimplifyByArea { area } => Ok(vertices::simplify(map, Simplification::Area(*area))),
             Attack::Buffer(buffering) => Ok(buffering.apply(map)),
             Attack::Vectorise { pixel } => rasters::vectorise(map, *pixel),
             Attack::Dissolve => Ok(topology::dissolve(map)),

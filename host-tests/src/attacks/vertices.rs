@@ -101,29 +101,34 @@ fn edges(map: &Map) -> BTreeSet<Edge> {
     edges
 }
 
-/// Simplifies every line and ring by itself (Douglas and Peucker 1973), as `ogr2ogr -simplify`
-/// does.
-pub fn simplify(map: &Map, tolerance: f64) -> Map {
-    map.map_geometries(|geometry| {
-        Some(match geometry {
-            Geometry::LineString(g) => g.simplify(tolerance).into(),
-            Geometry::MultiLineString(g) => g.simplify(tolerance).into(),
-            Geometry::Polygon(g) => g.simplify(tolerance).into(),
-            Geometry::MultiPolygon(g) => g.simplify(tolerance).into(),
-            other => other.clone(),
-        })
-    })
+/// The vertices that a simplification removes.
+#[derive(Debug, Clone, Copy)]
+pub enum Simplification {
+    /// Vertices within this tolerance of the simplified line (Douglas and Peucker 1973), as
+    /// `ogr2ogr -simplify` does.
+    Distance(f64),
+    /// Vertices that span triangles under this area with their neighbours, smallest first
+    /// (Visvalingam and Whyatt 1993).
+    Area(f64),
 }
 
-/// Takes the vertices out of every line and ring, each by itself, that span triangles under this
-/// area with their neighbours, smallest first (Visvalingam and Whyatt 1993).
-pub fn simplify_by_area(map: &Map, area: f64) -> Map {
+impl Simplification {
+    fn apply<G: Simplify<f64> + SimplifyVw<f64>>(self, geometry: &G) -> G {
+        match self {
+            Simplification::Distance(tolerance) => geometry.simplify(tolerance),
+            Simplification::Area(area) => geometry.simplify_vw(area),
+        }
+    }
+}
+
+/// Simplifies every line and ring by itself.
+pub fn simplify(map: &Map, how: Simplification) -> Map {
     map.map_geometries(|geometry| {
         Some(match geometry {
-            Geometry::LineString(g) => g.simplify_vw(area).into(),
-            Geometry::MultiLineString(g) => g.simplify_vw(area).into(),
-            Geometry::Polygon(g) => g.simplify_vw(area).into(),
-            Geometry::MultiPolygon(g) => g.simplify_vw(area).into(),
+            Geometry::LineString(g) => how.apply(g).into(),
+            Geometry::MultiLineString(g) => how.apply(g).into(),
+            Geometry::Polygon(g) => how.apply(g).into(),
+            Geometry::MultiPolygon(g) => how.apply(g).into(),
             other => other.clone(),
         })
     })
@@ -198,14 +203,14 @@ mod tests {
     #[test]
     fn simplification_drops_what_is_within_the_tolerance() {
         let map = in_memory(&["LINESTRING (0 0,50 4,99 0)", "LINESTRING (0 0,50 6,99 0)", "POINT (1 1)"]);
-        let simple = wkt(&simplify(&map, 5.0));
+        let simple = wkt(&simplify(&map, Simplification::Distance(5.0)));
         assert_eq!(simple, ["LINESTRING (0 0,99 0)", "LINESTRING (0 0,50 6,99 0)", "POINT (1 1)"]);
     }
 
     #[test]
     fn simplification_by_area_drops_small_triangles() {
         let map = in_memory(&["LINESTRING (0 0,5 1,10 0)", "LINESTRING (0 0,5 3,10 0)", "POINT (1 1)"]);
-        let simple = wkt(&simplify_by_area(&map, 10.0));
+        let simple = wkt(&simplify(&map, Simplification::Area(10.0)));
         assert_eq!(simple, ["LINESTRING (0 0,10 0)", "LINESTRING (0 0,5 3,10 0)", "POINT (1 1)"]);
     }
 

@@ -12,13 +12,11 @@ use meshmark_verifier::{
     Error, ExitCode, Result,
     compare::{Comparison, compare, detail::ComparedFiles},
     distribute, html,
-    inputs::{digests::Inputs, gdal_failures, texts, versions::versions},
+    inputs::{digests::Digests, gdal_failures, texts, versions::versions},
     outputs::{EvidenceMapFile, Format, ReportFile},
     progress::Progress,
     report::{self, Provenance, Report},
-    verify,
-    verify::with_reference_of_record,
-    verify_records,
+    verify, verify_records,
     words::printable,
 };
 use request::request;
@@ -138,31 +136,24 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     let wanted = args.explain || file.is_some();
-    let (key, references, suspect) = (args.key.clone(), args.reference.clone(), args.suspect.clone());
-    let digest = |reference: &Path| Inputs::read(&key, reference, &suspect);
-    let inputs = match references.as_slice() {
-        [one] if wanted => Some(digest(one)?), // as they are before the verification
-        _ => None,
-    };
-    let (json, explain) = (args.json, args.explain);
-    let (records, record) = (args.records.clone(), args.record.clone());
+    let references = args.reference.clone();
+    let digest = || Digests::read(&args.key, &references, &args.suspect, args.record.as_deref());
+    let digests = wanted.then(digest).transpose()?;
+    let (json, explain, records) = (args.json, args.explain, args.records.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut report = match &records {
         Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,
-        None => verify(&with_reference_of_record(&request, &references, &mut progress)?, &mut progress)?,
+        None => verify(&request, &references, &mut progress)?,
     };
     if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
         target.write(&map)?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
     print(&if json { report.to_json() } else { report.to_text() })?;
-    if !wanted {
-        return Ok(report.exit_code());
-    }
-    let inputs = inputs.map_or_else(|| digest(&report.reference), Ok)?;
+    let Some(digests) = digests else { return Ok(report.exit_code()) };
     let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
-    let inputs = inputs.with_record(record.or_else(best).as_deref())?;
+    let inputs = digests.of_verification(&report.reference, best().as_deref())?;
     if explain {
         print(&format!("\n{}", report::explain(&inputs, &report)))?;
     }

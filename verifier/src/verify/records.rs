@@ -4,10 +4,9 @@
 //! registered, matched and demodulated once for all of them.
 
 use super::{
-    belonging::check_key,
+    belonging::{check_key, is_made_from},
     conclusion::conclude,
     examination::{Examination, Suited, examine, read_reference},
-    references::is_made_from,
     request::Request,
 };
 use crate::{
@@ -168,6 +167,9 @@ fn examine_group(
     let mut examined = Vec::new();
     let mut other = None;
     for path in references {
+        if group.candidates.is_empty() {
+            return Ok(examined);
+        }
         let request = Request { reference: path.clone(), ..group.request.clone() };
         let reference = match read_reference(&request, progress)? {
             Suited::Yes(reference) => reference,
