@@ -5,8 +5,8 @@ use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{ground::Ground, options::Options, scale::ScaleLattice};
 use meshmark_dataset::{
-    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, features,
-    marked_view, marking, survey,
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, features, marked_view,
+    marking, survey,
 };
 use std::{collections::BTreeSet, path::Path};
 
@@ -28,7 +28,7 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     if let LabelFields::Named(names) = reading.landmarks {
         check_fields(path, &dataset, names)?;
     }
-    read("reference", path, &dataset, reading, TargetCrs::Own)
+    read("reference", path, &dataset, reading)
 }
 
 /// Opens a map for marking, and reads its vertices.
@@ -43,7 +43,7 @@ pub(crate) fn source(
     let dataset = open("map", path)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
-    let survey = read("map", path, &dataset, &reading, TargetCrs::Own)?;
+    let survey = read("map", path, &dataset, &reading)?;
     marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
     Ok((dataset, survey))
 }
@@ -126,32 +126,20 @@ fn holds_password(path: &Path) -> bool {
             || of_url().is_some_and(|(user, _)| user.contains(':')))
 }
 
-pub(super) fn read(
-    what: &'static str,
-    path: &Path,
-    dataset: &Dataset,
-    reading: &Reading,
-    target: TargetCrs,
-) -> Result<Survey> {
-    survey_of(dataset, reading, target).map_err(|error| failed(what, path, error))
+fn read(what: &'static str, path: &Path, dataset: &Dataset, reading: &Reading) -> Result<Survey> {
+    forget_failure();
+    survey(dataset, &selection(reading)).map_err(|error| failed(what, path, error))
 }
 
-pub(super) fn survey_of(
-    dataset: &Dataset,
-    reading: &Reading,
-    target: TargetCrs,
-) -> meshmark_dataset::Result<Survey> {
-    forget_failure();
-    let selection = Selection {
+pub(super) fn selection<'a>(reading: &Reading<'a>) -> Selection<'a> {
+    Selection {
         layers: reading.layers,
         srs: reading.srs,
         labels: reading.landmarks,
-        target,
         geometries: reading.geometries,
         most_vertices: MOST_VERTICES,
         last_failure: &last_failure,
-    };
-    survey(dataset, &selection)
+    }
 }
 
 pub(crate) fn failed(what: &'static str, path: &Path, source: meshmark_dataset::Error) -> Error {

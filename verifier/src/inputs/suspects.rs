@@ -1,13 +1,13 @@
 //! Suspects, which may be manipulated: only local files of plain formats are read, without network.
 
 use super::{
-    gdal_failures::GdalFailure,
-    maps::{Reading, failed, first_crs, open_with, read, survey_of},
+    gdal_failures::{GdalFailure, forget_failure},
+    maps::{Reading, failed, first_crs, open_with, selection},
     suspect_formats, svg, tables,
 };
 use crate::{Cause, Error, Result, words::printable};
 use gdal::{Dataset, vector::LayerAccess};
-use meshmark_dataset::{CoordinateSystem, Survey, TargetCrs};
+use meshmark_dataset::{CoordinateSystem, LabelFields, Numbers, Survey, numbers};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -16,38 +16,37 @@ use std::{
 /// A suspect after reading.
 pub struct Suspect {
     /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
-    /// in its own.
+    /// in its own; otherwise the numbers of the file.
     pub map: Survey,
-    /// Whether the coordinates of `map` are unchanged from the file.
-    pub is_raw: bool,
+    /// The numbers of the file, where `map` is in the CRS of the reference.
+    pub numbers: Option<Numbers>,
     /// CRS of the layers.
     pub layer_crs: Vec<String>,
     /// The first CRS of a layer.
     pub crs: Option<CoordinateSystem>,
 }
 
+/// A suspect is read whole, with all its attributes.
+const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
+
 /// Reads the suspect in the CRS of the reference, where both are known. Where reprojection fails,
-/// it reads the coordinates unchanged.
-pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
+/// the coordinates stay unchanged.
+pub fn suspect(path: &Path, reference: &Survey) -> Result<Suspect> {
     let dataset = open_suspect(path)?;
-    let layer_crs = crs_of(&dataset);
-    let crs = first_crs(&dataset);
+    let (layer_crs, crs) = (crs_of(&dataset), first_crs(&dataset));
+    let failed = |error| failed("suspect", path, error);
+    forget_failure();
+    let numbers = numbers(&dataset, &selection(&WHOLE)).map_err(failed)?;
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
-        match survey_of(&dataset, reading, TargetCrs::Crs(target)) {
-            Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
+        match numbers.in_crs(target) {
+            Ok(map) => return Ok(Suspect { map, numbers: Some(numbers), layer_crs, crs }),
             // PROJ fails, or the map exceeds its limits, when the CRS is not that of the
             // coordinates.
             Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
-            Err(error) => return Err(failed("suspect", path, error)),
+            Err(error) => return Err(failed(error)),
         }
     }
-    let map = read("suspect", path, &dataset, reading, TargetCrs::Raw)?;
-    Ok(Suspect { map, is_raw: true, layer_crs, crs })
-}
-
-/// Reads the coordinates of the suspect unchanged.
-pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
-    read("suspect", path, &open_suspect(path)?, reading, TargetCrs::Raw)
+    Ok(Suspect { map: numbers.raw().map_err(failed)?, numbers: None, layer_crs, crs })
 }
 
 fn open_suspect(path: &Path) -> Result<Dataset> {

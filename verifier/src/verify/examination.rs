@@ -15,7 +15,7 @@ use crate::{
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
 use meshmark_core::demodulation::Demodulation;
-use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
+use meshmark_dataset::{CoordinateSystem, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Observations, Reference,
     decision::{Decision, Decoys, Expected, decide_among},
@@ -133,12 +133,9 @@ pub fn examine(
     Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
 }
 
-/// A suspect is read whole, with all its attributes.
-const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
-
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
     progress.start("reading", 0);
-    suspects::suspect(&request.suspect, &WHOLE, reference)
+    suspects::suspect(&request.suspect, reference)
 }
 
 fn register(
@@ -149,8 +146,8 @@ fn register(
 ) -> Result<Registered> {
     progress.start("registration", 0);
     let registrar = Registrar::new(&reference.data, &compared.ground, request.radius.least_m());
-    let file = (request.suspect.as_path(), &WHOLE);
-    crs_search::register(&registrar, reference, suspect, file, request.registration)
+    let registered = crs_search::register(&registrar, reference, suspect, request.registration);
+    registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
 }
 
 /// Demodulates what matches, and measures what a present mark would show; nothing where matches are
