@@ -5,11 +5,9 @@
 //! size prefix (flatgeobuf.org/src/fbs). The index is a packed R-tree: nodes of a bounding box and
 //! an offset, level by level, the root first.
 
-use crate::{
-    Error, Result,
-    inputs::gdal_failures::{GdalFailure, forget_failure},
-};
-use gdal::{Dataset, vector::LayerAccess};
+use super::opening::open;
+use crate::{Error, Result, inputs::gdal_failures::GdalFailure};
+use gdal::vector::LayerAccess;
 use meshmark_dataset::{Action, file_error, marking::Moves};
 use std::{fs, ops::Range, path::Path};
 
@@ -65,9 +63,8 @@ pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
 /// Returns the bounding boxes of all features in the order of the file. GDAL computes the extent of
 /// arcs.
 fn boxes(file: &Path) -> Result<Vec<Bounds>> {
-    forget_failure();
     let failed = |error| Error::unwritten("FlatGeobuf", GdalFailure::new(error));
-    let dataset = Dataset::open(file).map_err(failed)?;
+    let dataset = open(file, "FlatGeobuf")?;
     let mut layer = dataset.layer(0).map_err(failed)?;
     let of_feature = |feature: gdal::vector::Feature| match feature.geometry_by_index(0) {
         Ok(geometry) if !geometry.is_empty() => {

@@ -14,6 +14,7 @@ mod flatgeobuf;
 mod geojson;
 mod moving;
 mod ogr2ogr;
+mod opening;
 mod plain;
 mod recipients;
 mod request;

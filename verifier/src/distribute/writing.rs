@@ -1,11 +1,11 @@
 //! Writing of a copy: it is written, read back and published.
 
-use super::{copies::MarkedCopy, moving, staging::Stage};
+use super::{copies::MarkedCopy, moving, opening::open, staging::Stage};
 use crate::{
-    Error, Result,
-    inputs::gdal_failures::{GdalFailure, forget_failure, last_failure},
+    Result,
+    inputs::gdal_failures::{forget_failure, last_failure},
 };
-use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
+use gdal::vector::LayerAccess;
 use meshmark_core::{
     key::SecretKey,
     options::Options,
@@ -115,14 +115,4 @@ fn publish(
         }
     }
     Ok(publication.run(workplace.folder())?)
-}
-
-fn open(path: &Path, driver: &str) -> Result<Dataset> {
-    let options = DatasetOptions {
-        open_flags: GdalOpenFlags::GDAL_OF_READONLY | GdalOpenFlags::GDAL_OF_VECTOR,
-        allowed_drivers: Some(&[driver]),
-        ..DatasetOptions::default()
-    };
-    forget_failure();
-    Dataset::open_ex(path, options).map_err(|error| Error::unwritten(path.display(), GdalFailure::new(error)))
 }
