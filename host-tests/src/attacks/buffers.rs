@@ -1,4 +1,4 @@
-//! Attacks that grow and shrink shapes: what a buffer makes of walls and of the lines of roads.
+//! Attacks that grow and shrink shapes: buffers of walls and of the lines of roads.
 
 use super::{Map, parts::is_polygonal};
 use geo::{
@@ -9,20 +9,20 @@ use geo::{
 /// A corner sharper than this, in radians, is not drawn out to a mitre; GIS stop at five times the
 /// distance.
 const SHARPEST_MITRE: f64 = 0.4;
-/// A tolerance, units of the CRS, that takes away the splinters of edges that the offset leaves at
+/// A tolerance, units of the CRS, that removes the splinters of edges that an offset leaves at
 /// blunt corners.
 const SPLINTERS: f64 = 0.01;
 
-/// What becomes of a convex corner.
+/// The shape of a buffer at a convex corner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Join {
     /// An arc.
     Round,
-    /// A corner again.
+    /// A corner.
     Mitre,
 }
 
-/// What is grown or shrunk by a distance, units of the CRS. Nothing else of the map is left.
+/// Geometries that grow or shrink by a distance, units of the CRS. The rest of the map is dropped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Buffering {
     /// Polygons out and in again.
@@ -34,7 +34,7 @@ pub enum Buffering {
 }
 
 impl Buffering {
-    /// What is left of a map.
+    /// Returns the rest of a map.
     pub fn apply(self, map: &Map) -> Map {
         map.map_geometries(|geometry| self.of_geometry(geometry)).of_any_type()
     }
@@ -64,7 +64,7 @@ fn style(distance: f64, join: Join) -> BufferStyle<f64> {
     }
 }
 
-/// A polygon, several, or nothing.
+/// Returns one polygon, several, or nothing.
 pub(super) fn one_or_many(mut polygons: MultiPolygon) -> Option<Geometry> {
     match polygons.0.len() {
         0 => None,

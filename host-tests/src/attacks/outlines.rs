@@ -1,22 +1,21 @@
-//! Attacks that leave of every polygon something simpler that stands for it, and nothing else of
-//! the map.
+//! Attacks that replace every polygon by a simpler geometry, and drop the rest of the map.
 
 use super::{Map, parts::is_polygonal};
 use geo::{BoundingRect, Centroid, Geometry, MinimumRotatedRect};
 
-/// What stands for a polygon.
+/// The geometry that replaces a polygon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outline {
     /// Its centroid.
     Centroid,
     /// Its extent along the axes.
     BoundingBox,
-    /// The rectangle of the smallest area around it.
+    /// The rectangle with the smallest area around it.
     MinimumRectangle,
 }
 
 impl Outline {
-    /// What is left of a map: features of polygons as their outlines.
+    /// Returns the features of polygons as their outlines.
     pub fn apply(self, map: &Map) -> Map {
         map.map_geometries(|geometry| self.of_polygon(geometry)).of_any_type()
     }

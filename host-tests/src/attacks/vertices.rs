@@ -9,12 +9,13 @@ use crate::Result;
 use geo::{Coord, Geometry, Simplify, SimplifyVw};
 use std::collections::{BTreeSet, HashMap};
 
-/// An edge without a direction: smaller end first, so that all features that share it agree on it.
+/// An edge without a direction: the smaller end comes first, so that all features that share the
+/// edge agree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Edge([[u64; 2]; 2]);
 
 impl Edge {
-    /// The edge, and whether it was given from its larger end. `None` between equal ends.
+    /// Returns the edge and whether its larger end comes first; `None` between equal ends.
     fn new(a: Coord, b: Coord) -> Option<(Edge, bool)> {
         let bits = |c: Coord| [c.x.to_bits(), c.y.to_bits()];
         match bits(a).cmp(&bits(b)) {
@@ -37,7 +38,7 @@ impl Edge {
 /// Inserts vertices at random places of random edges, in every feature that has the edge.
 ///
 /// # Errors
-/// A map of points only.
+/// Fails on a map of points alone.
 pub fn insert(map: &Map, count: usize, seed: u64) -> Result<Map> {
     let edges: Vec<Edge> = edges(map).into_iter().collect();
     if edges.is_empty() {
@@ -83,7 +84,7 @@ fn subdivide(map: &Map, shares: impl Fn(Edge) -> Vec<f64>) -> Map {
             divided.push(b);
         }
         if part == Part::Ring {
-            divided.pop(); // the closing edge came back to the start
+            divided.pop(); // the closing edge ends at the start
         }
         divided
     })
@@ -134,11 +135,11 @@ pub fn simplify(map: &Map, how: Simplification) -> Map {
     })
 }
 
-/// Deletes a share of the distinct vertices, chosen at random. A part that is left with too few
-/// goes whole, and its vertices count: the share is met to within the last part.
+/// Deletes a share of the distinct vertices, chosen at random. A part with too few remaining
+/// vertices is dropped, and its vertices count, so the share is exact to within the last part.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn delete(map: &Map, share: f64, seed: u64) -> Result<Map> {
     let rank = PerVertex::draw(map, seed, Random::unit)?;
     let without = |below: f64| {
@@ -146,7 +147,7 @@ pub fn delete(map: &Map, share: f64, seed: u64) -> Result<Map> {
     };
     let target = (share * map.vertices()?.len() as f64).round() as usize;
     let left = map.vertices()?.len() - target;
-    // How many vertices go with their parts is found by bisection: more chosen, fewer left.
+    // Bisection finds how many vertices are dropped with their parts: more chosen, fewer left.
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = (low + high) / 2.0;
