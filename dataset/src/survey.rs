@@ -316,4 +316,25 @@ mod tests {
             assert_eq!(map.data.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }
     }
+
+    #[test]
+    fn every_layer_is_brought_from_its_own_crs_and_the_numbers_stay() {
+        let mut dataset =
+            DriverManager::get_driver_by_name("Memory").unwrap().create_vector_only("").unwrap();
+        for (epsg, place) in [(4326, "POINT (10 50)"), (3857, "POINT (1113194.9079 6446275.8410)")] {
+            let srs = gdal::spatial_ref::SpatialRef::from_epsg(epsg).unwrap();
+            let ty = OGRwkbGeometryType::wkbPoint;
+            let options = LayerOptions { name: "places", ty, srs: Some(&srs), ..Default::default() };
+            let mut layer = dataset.create_layer(options).unwrap();
+            layer.create_feature(Geometry::from_wkt(place).unwrap()).unwrap();
+        }
+        assert!(survey(&dataset, &Selection::default()).is_err(), "the layers share no CRS");
+        let numbers = numbers(&dataset, &Selection::default()).unwrap();
+        let map = numbers.in_crs(&parse_srs("EPSG:3857").unwrap()).unwrap();
+        let [a, b] = map.data.vertices.coords() else { panic!("{:?}", map.data.vertices.coords()) };
+        assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3, "{a:?} {b:?}");
+        let raw = numbers.raw().unwrap();
+        assert_eq!(raw.data.vertices.coords(), [[10.0, 50.0], [1113194.9079, 6446275.841]]);
+        assert!(raw.crs.is_none());
+    }
 }
