@@ -3,7 +3,7 @@
 use super::Map;
 use crate::Result;
 
-/// Where an affine map has its fixed point.
+/// The fixed point of an affine map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum About {
     /// The lower left corner of the map's bounding box.
