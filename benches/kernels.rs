@@ -1,9 +1,9 @@
-//! The kernels against their rivals, on one thread: `cargo bench -p meshmark-benches`.
+//! The kernels beside their rivals, on one thread: `cargo bench -p meshmark-benches`.
 //!
-//! Ours computes the eigenvectors that a mark uses, the others all of them, as their interfaces go.
-//! LAPACK is that of Debian's OpenBLAS, CGAL and SciPy are programs of their own, too. What is not
-//! installed is left out: the packages libopenblas-dev, libcgal-dev, and what `make bench` installs
-//! for Python.
+//! Our kernel computes the eigenvectors that a mark uses; the interfaces of the others allow only
+//! all of them. LAPACK is that of Debian's OpenBLAS; CGAL and SciPy run as programs. Rivals that
+//! are not installed are left out: the packages libopenblas-dev and libcgal-dev, and the Python
+//! packages that `make bench` installs.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::{Mat, Par, Side};
@@ -71,7 +71,8 @@ fn delaunay(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Every vertex's counterpart in a copy whose vertices were moved by less than the radius.
+/// Measures the search for the counterpart of every vertex in a copy whose vertices moved by less
+/// than the radius.
 fn matching(criterion: &mut Criterion) {
     const RADIUS_M: f64 = 1.0;
     let points = points();
@@ -102,7 +103,7 @@ fn survey_of(map: &str) -> Survey {
     survey(&Dataset::open(map).expect("the fixture opens"), &Selection::default()).expect("and is a map")
 }
 
-/// The vertices of a map, metres from its middle.
+/// Returns the vertices of a map, metres from its middle.
 fn points() -> Vec<[f64; 2]> {
     survey_of(MAP).data.vertices.local(1.0)
 }
@@ -115,7 +116,7 @@ fn first_patch(patch_size: usize) -> Patch {
     patches.as_slice()[0].clone()
 }
 
-/// The matrix that [`Basis`] solves, as it gives it to any solver.
+/// Returns the matrix that [`Basis`] passes to a solver.
 fn laplacian(patch: &Patch) -> Mat<f64> {
     let seen = std::cell::RefCell::new(Mat::new());
     let _ = Basis::with_solver(patch, 1, |matrix, _| {
@@ -138,7 +139,7 @@ fn time_dsyevd(program: &Path, matrix: &[f64], repetitions: u64) -> Duration {
     time_program(command.env("OPENBLAS_NUM_THREADS", "1"), matrix)
 }
 
-/// Hands numbers to a program that prints how many seconds it took.
+/// Passes numbers to a program, which prints the seconds it takes.
 fn time_program(command: &mut Command, numbers: &[f64]) -> Duration {
     let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut child = piped.spawn().expect("a program that was found");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Times a newcomer's path in clean Debians: from a clone to the end of `make demo`, from the package
-# to the first marked file, from a suspect to its report. Rust is there from the start, everything
+# to the first marked file, from a suspect to its report. Rust exists from the start, everything
 # else is fetched. Installs debootstrap where it is missing, and needs root, or sudo, for the clean
 # roots.
 # Usage: newcomer.sh
@@ -18,7 +18,7 @@ developer=$work/developer user=$work/user
 new_root bookworm "$developer"
 "${as_root[@]}" cp -a "$developer" "$user"
 
-# step WHAT FOLDER COMMAND: prints the seconds it took.
+# step WHAT FOLDER COMMAND: runs it and prints the seconds.
 step() {
     in_root "$2" "$1" "$3"
     printf '%5d s  %s\n' "$seconds" "$1"

@@ -1,4 +1,4 @@
-"""Times SciPy's k-d tree at matching: for two sets of points, the nearest of each in the other set.
+"""Times the matching by SciPy's k-d tree: for two sets of points, the nearest of each in the other.
 
 arguments: radius, repetitions
 stdin:     two sets of N points as f64 x, f64 y, one after the other

@@ -1,4 +1,4 @@
-"""The paper's method as one would write it with numpy: what `make bench` compares the driver with.
+"""The paper's method, written with numpy; `make bench` compares the driver with it.
 
 python3 mesh_spectral.py INPUT OUTPUT SEED
 
@@ -46,7 +46,7 @@ def edges_of(points):
 
 
 def displacement(job):
-    """n × 2 metres for a patch of n vertices: a number, its size and its edges."""
+    """Returns n × 2 metres for a patch of n vertices, given by its number, size and edges."""
     seed, number, size, edges, bits = job
     adjacency = np.zeros((size, size))
     adjacency[edges[:, 0], edges[:, 1]] = adjacency[edges[:, 1], edges[:, 0]] = 1.0
@@ -61,7 +61,7 @@ def displacement(job):
 
 
 def mark(vertices, seed):
-    """The vertices' new places."""
+    """Returns the new places of the vertices."""
     bits = np.random.default_rng(seed).choice([-1.0, 1.0], size=BITS)
     parts = []
     split(vertices, np.arange(len(vertices)), len(vertices) // PATCH_SIZE, parts)

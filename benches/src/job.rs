@@ -1,4 +1,4 @@
-//! Whole jobs on one map: plain `ogr2ogr`, the same through the driver, the numpy script,
+//! Whole jobs on one map: plain `ogr2ogr`, the same through the driver, the numpy script, and
 //! verification.
 
 use crate::stages::Stages;
@@ -18,15 +18,14 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// Maps of more vertices are measured once instead of twice, without the stages and without the
-/// script.
+/// Maps with more vertices are measured once instead of twice, without the stages and the script.
 const HUGE: usize = 1_000_000;
 
-/// Recipients of the long list.
+/// Number of recipients in the long list.
 const MANY: usize = 9;
 
-/// Patches of half the size with one chip a bit: as many chips in the map, and a quarter of the
-/// solving.
+/// Options for patches of half the size with one chip per bit: the map has as many chips and takes
+/// a quarter of the time to solve.
 const SMALL_PATCHES: [&str; 6] = ["-oo", "PATCH_SIZE=256", "-oo", "CHIP_RATE=1", "-oo", "CODE=REPETITION"];
 
 /// The programs.
@@ -37,7 +36,7 @@ pub struct Programs {
     pub script: Option<[PathBuf; 2]>,
 }
 
-/// All that is measured of one map.
+/// The measurements of one map.
 #[derive(Debug, Serialize)]
 pub struct Jobs {
     pub name: String,
@@ -48,7 +47,7 @@ pub struct Jobs {
     pub small_patches: Runs,
     pub script: Runs,
     pub verified: Runs,
-    /// `meshmark distribute` to one recipient, and to nine.
+    /// Runs of `meshmark distribute` for one recipient, and for nine.
     pub distributed: [Runs; 2],
     /// Seconds of the stages of the last verification, and its verdict.
     pub verification: Value,
@@ -56,10 +55,10 @@ pub struct Jobs {
 }
 
 impl Jobs {
-    /// Runs the jobs on a map of so many vertices, in turns.
+    /// Runs the jobs in turns on a map with this number of vertices.
     ///
     /// # Errors
-    /// When one of them fails.
+    /// Fails when one of them fails.
     pub fn measure(programs: &Programs, map: &Path, vertices: usize) -> Result<Self> {
         let work = Work::new(programs, map)?;
         let name = map.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -96,12 +95,12 @@ impl Jobs {
         Ok(jobs)
     }
 
-    /// Seconds for each further recipient of `meshmark distribute`.
+    /// Returns seconds for each further recipient of `meshmark distribute`.
     pub fn further_s(&self) -> f64 {
         (self.distributed[1].best_s() - self.distributed[0].best_s()) / (MANY - 1) as f64
     }
 
-    /// How many bytes of memory a vertex costs above plain `ogr2ogr`.
+    /// Returns the bytes of memory per vertex beyond those of plain `ogr2ogr`.
     pub fn bytes_per_vertex(&self) -> f64 {
         (self.marked.peak_bytes() - self.plain.peak_bytes()) / self.vertices as f64
     }
@@ -126,10 +125,10 @@ impl<'a> Work<'a> {
     }
 
     fn run(&self, command: &mut Command, exit_codes: &[i32]) -> Result<Run> {
-        Run::of(command, self.folder.path(), exit_codes)
+        Run::measure(command, self.folder.path(), exit_codes)
     }
 
-    /// The path of an output that is not there, so that every run does the same work.
+    /// Returns the path of an output after its removal, so that every run does the same work.
     fn output(&self, file: &str) -> Result<PathBuf> {
         let path = self.path(file);
         if path.exists() {

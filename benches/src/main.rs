@@ -1,9 +1,10 @@
-//! What marking and verifying cost, beside plain `ogr2ogr` and a numpy script, from thousands of
-//! vertices to millions: prints a Markdown table with a column for every map and tiling, and writes
-//! it with JSON and plots. `meshmark` and the driver are those next to this program.
+//! Measures the cost of marking and verifying beside plain `ogr2ogr` and a numpy script, from
+//! thousands of vertices to millions. The program prints a Markdown table with a column for every
+//! map and tiling, and writes it with JSON and plots. It uses the `meshmark` and the driver beside
+//! it.
 //!
-//! Processes run as a user runs them, in turns; stages are timed in this process. Nothing is
-//! asserted, for times depend on the machine and on what else it does.
+//! Processes run in turns, as a user runs them; stages are timed in this process. Nothing is
+//! asserted, as times depend on the machine and its load.
 
 mod job;
 mod report;
@@ -25,7 +26,7 @@ struct Arguments {
     /// Maps, the smallest first.
     #[arg(required = true)]
     maps: Vec<PathBuf>,
-    /// Also so many copies of the last map, side by side.
+    /// Numbers of copies of the last map, side by side, to measure as well.
     #[arg(long, value_delimiter = ',')]
     tiles: Vec<usize>,
     /// A Python with the requirements of the numpy script, and the script.
@@ -38,7 +39,7 @@ struct Arguments {
 
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
-    gdal::config::set_error_handler(|_, _, _| ()); // warnings about a map are not what is measured
+    gdal::config::set_error_handler(|_, _, _| ()); // warnings about a map do not matter here
     fs::create_dir_all(&arguments.out)?;
     let programs = programs(arguments.script)?;
     let load_ms = load_ms(programs.product.plugins())?;

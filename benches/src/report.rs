@@ -1,4 +1,4 @@
-//! What was measured, as Markdown and as a plot.
+//! The measurements as Markdown and as a plot.
 
 use crate::{job::Jobs, stages::Stages};
 use meshmark_host_tests::Result;
@@ -6,10 +6,10 @@ use meshmark_studies::plot::{Axis, Plot, Series};
 use plotters::style::{BLUE, GREEN, RED, RGBColor};
 use std::fs;
 
-/// From so many vertices on, time and memory are fitted by a power of N.
+/// From this number of vertices on, time and memory are fitted by a power of N.
 const LEAST_FITTED: usize = 100_000;
 
-/// A row of the table: what it is, and its value for a map.
+/// A row of the table: its title, and its value for a map.
 type Row = (&'static str, fn(&Jobs) -> String);
 
 const ROWS: &[Row] = &[
@@ -67,7 +67,7 @@ fn verification(jobs: &Jobs, stage: &str) -> String {
     seconds(jobs.verification[stage].as_f64().unwrap_or(f64::NAN))
 }
 
-/// The table, and under it what does not belong to one map.
+/// Returns the table, followed by the measurements that do not belong to one map.
 pub fn markdown(all: &[Jobs], load_ms: f64) -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut text = format!(
@@ -102,7 +102,7 @@ const SCALED: [Scaled; 4] = [
     ("Its memory", |j| j.verified.peak_bytes()),
 ];
 
-/// The slope of log y over log N by least squares.
+/// Returns the slope of log y over log N by least squares.
 fn exponent(all: &[Jobs], of: fn(&Jobs) -> f64) -> Option<f64> {
     let large = all.iter().filter(|jobs| jobs.vertices >= LEAST_FITTED);
     let points: Vec<[f64; 2]> = large.map(|jobs| [(jobs.vertices as f64).ln(), of(jobs).ln()]).collect();
@@ -112,10 +112,10 @@ fn exponent(all: &[Jobs], of: fn(&Jobs) -> f64) -> Option<f64> {
     (points.len() > 1 && moment(0) > 0.0).then(|| moment(1) / moment(0))
 }
 
-/// Time and memory against the number of vertices, both axes logarithmic.
+/// Plots time and memory against the number of vertices on logarithmic axes.
 ///
 /// # Errors
-/// As [`Plot::to_svg`].
+/// Fails like [`Plot::to_svg`].
 pub fn plots(all: &[Jobs]) -> Result<[(&'static str, String); 2]> {
     let series = |name: &str, colour: RGBColor, thin: bool, of: &dyn Fn(&Jobs) -> f64| {
         let points = all.iter().map(|jobs| (jobs.vertices as f64, of(jobs)));
@@ -146,8 +146,8 @@ fn processor_name() -> String {
     name.map_or("unknown processor".into(), |(_, name)| name.trim().into())
 }
 
-/// How many processes wanted to run in the last minute: more than threads means that times are too
-/// long.
+/// Returns the number of runnable processes in the last minute: if it exceeds that of the threads,
+/// times are too long.
 fn load() -> String {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split(' ').next().unwrap_or_default().into()

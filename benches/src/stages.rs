@@ -15,30 +15,30 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::{hint::black_box, path::Path, time::Instant};
 
-/// So many patches, spread over the map, are solved.
+/// Number of patches that are solved, spread over the map.
 const SOLVED: usize = 96;
 
-/// What each takes.
+/// The times of the stages, seconds.
 #[derive(Debug, Clone, Serialize)]
 pub struct Stages {
     pub vertices: usize,
     pub patches: usize,
     pub read_s: f64,
-    /// Mesh, constraints, patches.
+    /// Time of mesh, constraints and patches.
     pub cut_s: f64,
-    /// One patch on one thread, the mean of some.
+    /// Time of one patch on one thread, the mean of several.
     pub solve_s: f64,
-    /// How many times faster two threads solve them than one.
+    /// The factor by which two threads solve them faster than one.
     pub solve_speed_up: f64,
-    /// Mesh, patches, solves, topology and reading back, all threads.
+    /// Time of mesh, patches, solves, topology and reading back on all threads.
     pub embed_s: f64,
 }
 
 impl Stages {
-    /// Times the stages of a map.
+    /// Measures the stages of a map.
     ///
     /// # Errors
-    /// Those of reading and marking it.
+    /// Fails when the map cannot be read or marked.
     pub fn measure(path: &Path) -> Result<Self> {
         let parameters = Parameters::default();
         let (key, message) = (SecretKey::from_bytes([7; 32]), Message::from_bytes(&[0xa5; 16]));
@@ -61,7 +61,7 @@ impl Stages {
         })
     }
 
-    /// Seconds of processor time for solving every patch.
+    /// Returns seconds of processor time for solving every patch.
     pub fn solves_s(&self) -> f64 {
         self.solve_s * self.patches as f64
     }
@@ -74,7 +74,7 @@ fn solve_all(patches: &[&Patch], columns: usize, threads: usize) -> Result<f64> 
     Ok(seconds)
 }
 
-/// The fewest seconds that `f` takes, and what it returns.
+/// Returns the fewest seconds that `f` takes, and its result.
 fn best_of_two<T>(mut f: impl FnMut() -> Result<T>) -> Result<(f64, T)> {
     let mut timed = || {
         let since = Instant::now();

@@ -1,16 +1,16 @@
-//! What the driver costs those who do not use it.
+//! The cost of the driver for those who do not use it.
 
 use meshmark_host_tests::{Result, process::Run};
 use std::{path::Path, process::Command};
 
-/// Programs started with the driver and without, in turns.
+/// Number of programs started with the driver, and as many without it in turns.
 const STARTS: usize = 60;
 
-/// How many milliseconds longer `ogrinfo --formats` takes with the drivers of `plugins` than with
-/// none: the difference of the medians.
+/// Returns by how many milliseconds the drivers of `plugins` delay `ogrinfo --formats`: the
+/// difference of the medians.
 ///
 /// # Errors
-/// When ogrinfo does not run.
+/// Fails when ogrinfo does not run.
 pub fn load_ms(plugins: &Path) -> Result<f64> {
     let folder = tempfile::tempdir()?;
     let mut times = [Vec::new(), Vec::new()];
@@ -18,7 +18,7 @@ pub fn load_ms(plugins: &Path) -> Result<f64> {
         for (times, plugins) in times.iter_mut().zip([folder.path(), plugins]) {
             let mut command = Command::new("ogrinfo");
             command.arg("--formats").env("GDAL_DRIVER_PATH", plugins).stdout(std::process::Stdio::null());
-            times.push(1e3 * Run::of(&mut command, folder.path(), &[0])?.seconds);
+            times.push(1e3 * Run::measure(&mut command, folder.path(), &[0])?.seconds);
         }
     }
     let [without, with] = times.map(median);

@@ -3,7 +3,7 @@
 
 use meshmark_cgal::{self as cgal, delaunay_check::differing_edges_are_cocircular};
 use meshmark_core::{mesh::Mesh, vertices::VertexTable};
-use meshmark_dataset::{Selection, TargetCrs, survey};
+use meshmark_dataset::{Selection, numbers};
 use rand_chacha::{ChaCha20Rng, rand_core::Rng, rand_core::SeedableRng};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -73,8 +73,8 @@ fn random_with_duplicates() -> Vec<[f64; 2]> {
 }
 
 fn vertices_of(map: &Path) -> VertexTable {
-    let everything = Selection { target: TargetCrs::Raw, ..Selection::default() };
-    survey(&gdal::Dataset::open(map).unwrap(), &everything).unwrap().data.vertices
+    let dataset = gdal::Dataset::open(map).unwrap();
+    numbers(&dataset, &Selection::default()).unwrap().raw().unwrap().data.vertices
 }
 
 #[test]

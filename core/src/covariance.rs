@@ -50,7 +50,7 @@ impl Deformation {
 
     /// Returns the covariance of deformation, shifts and noise over found vertices, o × o. Only its
     /// lower triangle is filled, as the factorisation reads no more; weights divide the noise.
-    pub(crate) fn matrix(&self, at: &[Place], weights: &[f64]) -> Mat<f64> {
+    pub(crate) fn matrix(&self, at: &[Site], weights: &[f64]) -> Mat<f64> {
         Mat::from_fn(at.len(), at.len(), |i, j| {
             if i < j {
                 return 0.0;
@@ -64,16 +64,16 @@ impl Deformation {
 
 /// The place of a found vertex.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct Site {
     /// Metres.
     pub at_m: [f64; 2],
     /// Its polygon group.
     pub group: u32,
 }
 
-impl Place {
+impl Site {
     pub fn new(patches: &Patches, vertex: u32) -> Self {
-        Place { at_m: patches.positions_m()[vertex as usize], group: patches.group(vertex) }
+        Site { at_m: patches.positions_m()[vertex as usize], group: patches.group(vertex) }
     }
 }
 
@@ -87,7 +87,7 @@ pub(crate) enum Covariance {
 }
 
 impl Covariance {
-    pub fn new(deformation: &Deformation, at: &[Place], weights: &[f64]) -> Self {
+    pub fn new(deformation: &Deformation, at: &[Site], weights: &[f64]) -> Self {
         if !deformation.is_still() {
             return Covariance::Dense(factor(&deformation.matrix(at, weights)));
         }
@@ -143,7 +143,7 @@ pub(crate) struct Found {
     /// Their positions in the patch.
     pub rows: Vec<usize>,
     /// Their places.
-    pub at: Vec<Place>,
+    pub at: Vec<Site>,
     /// Their displacements, o × 2, metres.
     pub moved: Mat<f64>,
 }
@@ -155,7 +155,7 @@ impl Found {
             .filter(|(row, _)| !patch.hangs_elsewhere(*row))
             .filter_map(|(row, &v)| Some((row, observed[v as usize]?)))
             .unzip();
-        let at = rows.iter().map(|&row| Place::new(patches, patch.vertices[row])).collect();
+        let at = rows.iter().map(|&row| Site::new(patches, patch.vertices[row])).collect();
         Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
     }
 }

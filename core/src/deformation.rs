@@ -11,7 +11,7 @@ pub use crate::covariance::Deformation;
 
 use crate::{
     Result,
-    covariance::{Covariance, Found, Place, SHIFT_M, factor},
+    covariance::{Covariance, Found, SHIFT_M, Site, factor},
     noise_law::NoiseLaw,
     options::Parameters,
     patches::{Patch, Patches},
@@ -211,7 +211,7 @@ impl Kriging {
         let total = |axis: usize| (0..self.found.rows.len()).map(|o| self.solved[(o, axis)]).sum::<f64>();
         let shift = [0, 1].map(|axis| SHIFT_M.powi(2) * total(axis));
         let anywhere = |v: u32| {
-            let here = Place::new(patches, v);
+            let here = Site::new(patches, v);
             self.found.at.iter().enumerate().fold(shift, |sum, (o, there)| {
                 let k = self.deformation.covariance(here.at_m, there.at_m)
                     + self.deformation.of_groups(here.group, there.group);
@@ -234,7 +234,7 @@ impl Kriging {
 
 /// The data of one patch for the likelihood.
 struct Sample {
-    at: Vec<Place>,
+    at: Vec<Site>,
     /// o × 2.
     moved: Mat<f64>,
     /// α² E_o E_oᵀ, o × o.

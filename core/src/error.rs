@@ -5,7 +5,7 @@ use crate::{
 use std::fmt;
 
 /// The errors of the algorithm. Every message states what would have been legal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
     NotFinite { index: usize, x: f64, y: f64 },
@@ -19,8 +19,8 @@ pub enum Error {
     MessageLost { errors: usize, bits: usize },
     NoConvergence { vertices: usize },
     Message(String),
-    Key(String),
-    Record(String),
+    Key(KeyFault),
+    Record(RecordFault),
     UnknownOption(String),
     RepeatedOption(&'static str),
     EmptyOption(&'static str),
@@ -40,7 +40,64 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Record(RecordFault::Json(source)) => Some(source),
+            Error::Record(RecordFault::Value(source)) => Some(source),
+            _ => None,
+        }
+    }
+}
+
+/// The reason why a text is not a key. No reason quotes the text, which may hold the secret.
+#[derive(Debug)]
+#[allow(missing_docs)] // the messages are the documentation
+pub enum KeyFault {
+    Json,
+    Version { found: u32, expected: u32 },
+    Secret,
+    Id,
+}
+
+impl fmt::Display for KeyFault {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            KeyFault::Json => {
+                f.write_str("it is not JSON with exactly the fields meshmark_key, id and secret")
+            }
+            KeyFault::Version { found, expected } => write!(f, "version {found} instead of {expected}"),
+            KeyFault::Secret => f.write_str("the secret is not 64 hexadecimal digits"),
+            KeyFault::Id => f.write_str("the id is not that of the secret, so one of them was changed"),
+        }
+    }
+}
+
+/// The reason why a text is not a record.
+#[derive(Debug)]
+#[allow(missing_docs)] // the messages are the documentation
+pub enum RecordFault {
+    Json(serde_json::Error),
+    Version { found: u32, expected: u32 },
+    Value(Box<Error>),
+    WhitenedRecipient,
+}
+
+impl fmt::Display for RecordFault {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            // serde appends the list of all fields.
+            RecordFault::Json(source) => {
+                f.write_str(source.to_string().split(", expected one of").next().unwrap_or_default())
+            }
+            RecordFault::Version { found, expected } => write!(f, "version {found} instead of {expected}"),
+            RecordFault::Value(source) => source.fmt(f),
+            RecordFault::WhitenedRecipient => {
+                f.write_str("it has a recipient and a whitened message, of which only one can be")
+            }
+        }
+    }
+}
 
 impl Error {
     /// Returns the message, with options spelled as in the user's front end.

@@ -2,7 +2,7 @@
 
 pub use crate::options::RECIPIENT_BITS;
 
-use crate::{Error, Result, hex, message::Message};
+use crate::{Error, Result, error::KeyFault, hex, message::Message};
 use hmac::{Hmac, KeyInit, Mac};
 use serde::{Deserialize, Serialize};
 use sha2::Sha256;
@@ -60,19 +60,17 @@ impl SecretKey {
     /// [`Error::Key`] when it is not a key file of this version or its id is not that of its
     /// secret. The message never holds the secret.
     pub fn from_json(text: &str) -> Result<Self> {
-        let malformed = |reason: &str| Error::Key(reason.to_string());
         // The messages of serde may quote values of the file, so they are not shown.
-        let file: KeyFile = serde_json::from_str(text)
-            .map_err(|_| malformed("it is not JSON with exactly the fields meshmark_key, id and secret"))?;
+        let file: KeyFile = serde_json::from_str(text).map_err(|_| Error::Key(KeyFault::Json))?;
         if file.meshmark_key != VERSION {
-            return Err(malformed(&format!("version {} instead of {VERSION}", file.meshmark_key)));
+            let found = file.meshmark_key;
+            return Err(Error::Key(KeyFault::Version { found, expected: VERSION }));
         }
         let mut secret = Zeroizing::new([0; 32]);
-        hex::decode_into(&file.secret, secret.as_mut_slice())
-            .ok_or_else(|| malformed("the secret is not 64 hexadecimal digits"))?;
+        hex::decode_into(&file.secret, secret.as_mut_slice()).ok_or(Error::Key(KeyFault::Secret))?;
         let key = SecretKey(*secret);
         if key.id() != file.id {
-            return Err(malformed("the id is not that of the secret, so one of them was changed"));
+            return Err(Error::Key(KeyFault::Id));
         }
         Ok(key)
     }

@@ -113,8 +113,8 @@ mod tests {
     #[test]
     fn a_straight_line_is_refused() {
         let line: Vec<_> = (0..20_000).map(|i| [i as f64, 2.0 * i as f64]).collect();
-        assert_eq!(Mesh::delaunay(&line), Err(Error::Collinear { vertices: 20_000 }));
-        assert_eq!(Mesh::delaunay(&[[1.0, 1.0]]), Err(Error::Collinear { vertices: 1 }));
+        assert!(matches!(Mesh::delaunay(&line), Err(Error::Collinear { vertices: 20_000 })));
+        assert!(matches!(Mesh::delaunay(&[[1.0, 1.0]]), Err(Error::Collinear { vertices: 1 })));
     }
 
     #[test]
@@ -126,7 +126,7 @@ mod tests {
                 assert_eq!(Mesh::delaunay(&square(centre)).unwrap(), expected, "{centre:?}");
             }
             let strip = [[-tiny, 0.0], [0.0, 1.0], [tiny, 0.5]];
-            assert_eq!(Mesh::delaunay(&strip), Err(Error::Collinear { vertices: 3 }), "{tiny}");
+            assert!(matches!(Mesh::delaunay(&strip), Err(Error::Collinear { vertices: 3 })), "{tiny}");
         }
         for small in [1e-42, 1e-20] {
             let strip = [[-small, 0.0], [0.0, 1.0], [small, 0.5]];

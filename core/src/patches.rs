@@ -104,7 +104,7 @@ impl Patches {
         let mesh = Mesh::delaunay(&points)?;
         let constraints = Constraints::find(map, tree, parameters.shape);
         let leaves = split(&points, &constraints, points.len() / patch_size);
-        let place = Place::of_all(&leaves, points.len());
+        let place = PatchRow::of_all(&leaves, points.len());
         let mut patches = with_edges(leaves, mesh.edges(), &place);
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
         constrain(&mut patches, &constraints, &place);
@@ -256,17 +256,17 @@ fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
 
 /// The patch of a vertex and its position in it.
 #[derive(Clone, Copy)]
-struct Place {
+struct PatchRow {
     patch: u32,
     row: u32,
 }
 
-impl Place {
-    fn of_all(leaves: &[Vec<u32>], vertices: usize) -> Vec<Place> {
-        let mut places = vec![Place { patch: 0, row: 0 }; vertices];
+impl PatchRow {
+    fn of_all(leaves: &[Vec<u32>], vertices: usize) -> Vec<PatchRow> {
+        let mut places = vec![PatchRow { patch: 0, row: 0 }; vertices];
         for (patch, leaf) in leaves.iter().enumerate() {
             for (row, &v) in leaf.iter().enumerate() {
-                places[v as usize] = Place { patch: patch as u32, row: row as u32 };
+                places[v as usize] = PatchRow { patch: patch as u32, row: row as u32 };
             }
         }
         places
@@ -274,7 +274,7 @@ impl Place {
 }
 
 /// Gives every leaf the mesh edges whose two ends are in it.
-fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[Place]) -> Vec<Patch> {
+fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[PatchRow]) -> Vec<Patch> {
     let patch = |vertices: Vec<u32>| Patch {
         edges: Vec::with_capacity(3 * vertices.len()),
         vertices,
@@ -292,9 +292,9 @@ fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[Place]) -> Ve
 }
 
 /// Gives every patch the constraints on its vertices.
-fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[Place]) {
+fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[PatchRow]) {
     for hanging in constraints.junctions.hanging() {
-        let Place { patch, row } = places[hanging.vertex as usize];
+        let PatchRow { patch, row } = places[hanging.vertex as usize];
         let position = |&(anchor, weight): &(u32, f64)| match places[anchor as usize] {
             place if place.patch == patch => Some((place.row, weight)),
             _ => None,
@@ -316,7 +316,7 @@ const LEAST_HEIGHT: f64 = 0.01;
 /// Weighs the edges of every patch by cot α + cot β, over the angles that face them in the
 /// triangles of the mesh with all three corners in the patch. Edges of no such triangle, bridges
 /// among them, weigh 1.
-fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points: &[[f64; 2]]) {
+fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[PatchRow], points: &[[f64; 2]]) {
     let mut of_patch: Vec<Vec<[u32; 3]>> = vec![Vec::new(); patches.len()];
     for triangle in triangles {
         let corners = triangle.map(|v| places[v as usize]);
@@ -436,7 +436,7 @@ mod tests {
     fn capacity_counts_the_mean_as_taken() {
         let cut = Patches::new(&Map::of_points(&scattered(600), METRES), &size(300)).unwrap();
         let p = Parameters { code: Code::Repetition, chip_rate: 1, ..Parameters::default() };
-        assert_eq!(cut.carriers(299, &p), Ok(299));
+        assert_eq!(cut.carriers(299, &p).unwrap(), 299);
         assert!(cut.carriers(300, &p).unwrap_err().to_string().contains("has 299"));
     }
 

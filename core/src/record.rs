@@ -3,6 +3,7 @@
 use crate::{
     Error, Result,
     distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
+    error::RecordFault,
     message::Message,
     options::{Options, Parameters, Subject},
 };
@@ -92,6 +93,10 @@ pub struct TopologyEntry {
     pub attenuated_vertices: usize,
 }
 
+fn illegal(value: Error) -> Error {
+    Error::Record(RecordFault::Value(Box::new(value)))
+}
+
 fn is_false(value: &bool) -> bool {
     !value
 }
@@ -102,17 +107,15 @@ impl Record {
     /// # Errors
     /// [`Error::Record`] describes the fault.
     pub fn from_json(text: &str) -> Result<Self> {
-        let record: Record = serde_json::from_str(text).map_err(|error| {
-            // serde appends the list of all fields.
-            Error::Record(error.to_string().split(", expected one of").next().unwrap_or_default().into())
-        })?;
+        let record: Record =
+            serde_json::from_str(text).map_err(|error| Error::Record(RecordFault::Json(error)))?;
         if record.meshmark_record != VERSION {
             let found = record.meshmark_record;
-            return Err(Error::Record(format!("version {found} instead of {VERSION}")));
+            return Err(Error::Record(RecordFault::Version { found, expected: VERSION }));
         }
         record.options()?;
         let bits = record.message()?.len();
-        record.parameters.code.channel_bits(bits).map_err(|e| Error::Record(e.to_string()))?;
+        record.parameters.code.channel_bits(bits).map_err(illegal)?;
         Ok(record)
     }
 
@@ -148,7 +151,7 @@ impl Record {
             srs: self.srs.clone(),
             record_path: None,
         };
-        options.check().map_err(|e| Error::Record(e.to_string()))?;
+        options.check().map_err(illegal)?;
         Ok(options)
     }
 
@@ -157,7 +160,7 @@ impl Record {
     /// # Errors
     /// [`Error::Record`] when it is not hexadecimal.
     pub fn message(&self) -> Result<Message> {
-        Message::from_hex(&self.message).map_err(|e| Error::Record(e.to_string()))
+        Message::from_hex(&self.message).map_err(illegal)
     }
 
     /// Returns the subject of the mark.
@@ -167,9 +170,7 @@ impl Record {
     /// whitened message.
     pub fn subject(&self) -> Result<Subject> {
         match &self.recipient {
-            Some(_) if self.whitened => Err(Error::Record(
-                "it has a recipient and a whitened message, of which only one can be".into(),
-            )),
+            Some(_) if self.whitened => Err(Error::Record(RecordFault::WhitenedRecipient)),
             Some(text) => Ok(Subject::Recipient(text.clone())),
             None if self.whitened => Ok(Subject::Message(self.message()?)),
             None => Ok(Subject::Unwhitened(self.message()?)),

@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     extent::Extent,
-    wkb::{self, Step},
+    wkb::{self, GeometryFault, Step},
 };
 use gdal::vector::Feature;
 use meshmark_core::map_data::ChainKind;
@@ -67,8 +67,8 @@ pub(crate) fn read_geometry(
 ) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
     let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
-    let failed = |reason: String| Error::Geometry { layer: layer.into(), fid: fid(), reason };
-    let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
+    let failed = |source: GeometryFault| Error::Geometry { layer: layer.into(), fid: fid(), source };
+    let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.into()))?;
     if keeps_geometries && !wkb::is_plain(&bytes) {
         chains.others.insert(chains.firsts.len() as u32, bytes.clone());
     }
@@ -83,7 +83,7 @@ pub(crate) fn read_geometry(
     }) {
         Ok(()) => Ok(()),
         Err(Visit::Ours(error)) => Err(error),
-        Err(Visit::Wkb(error)) => Err(failed(error.to_string())),
+        Err(Visit::Wkb(error)) => Err(failed(error.into())),
     }
 }
 

@@ -234,10 +234,7 @@ pub(crate) fn reproject(
     layer: &str,
 ) -> Result<()> {
     let Some(from) = from.filter(|from| !from.is_same(target) && !coords.is_empty()) else { return Ok(()) };
-    let failed = |error: gdal::errors::GdalError| Error::Reprojection {
-        layer: layer.into(),
-        reason: error.to_string(),
-    };
+    let failed = |error: gdal::errors::GdalError| Error::Reprojection { layer: layer.into(), source: error };
     let (mut x, mut y): (Vec<f64>, Vec<f64>) = coords.iter().map(|p| (p[0], p[1])).unzip();
     let transform = from.transform_to(target).map_err(failed)?;
     transform.transform_coords(&mut x, &mut y, &mut []).map_err(failed)?;

@@ -165,7 +165,7 @@ mod tests {
     use super::*;
     use crate::formats::Format;
     use gdal::{
-        Dataset, DriverManager,
+        Dataset, DatasetOptions, DriverManager, GdalOpenFlags,
         spatial_ref::SpatialRef,
         vector::{Geometry, LayerAccess, LayerOptions, OGRwkbGeometryType},
     };
@@ -207,7 +207,9 @@ mod tests {
             layer.create_feature(point).unwrap();
         }
         file.close().unwrap();
-        let file = Dataset::open(&path).unwrap();
+        let open_flags = GdalOpenFlags::GDAL_OF_VECTOR;
+        let options = DatasetOptions { open_flags, ..DatasetOptions::default() };
+        let file = Dataset::open_ex(&path, options).unwrap(); // drivers of rasters open some texts
         let mut layer = file.layer(0).unwrap();
         layer
             .features()

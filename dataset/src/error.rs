@@ -1,6 +1,10 @@
-use crate::read_back::Difference;
+use crate::{read_back::Difference, wkb::GeometryFault};
+use gdal::errors::GdalError;
 use meshmark_core::options::Spelling;
-use std::{fmt, io, path::Path};
+use std::{
+    fmt, io,
+    path::{Path, PathBuf},
+};
 
 /// The errors of datasets. Every message names the input and the remedy.
 #[derive(Debug)]
@@ -15,9 +19,9 @@ pub enum Error {
     Geocentric(String),
     NotFinite { layer: String, fid: String, x: f64, y: f64 },
     TooFar { layer: String, fid: String, x: f64, y: f64 },
-    Geometry { layer: String, fid: String, reason: String },
+    Geometry { layer: String, fid: String, source: GeometryFault },
     Unreadable { layer: String, reason: String },
-    Reprojection { layer: String, reason: String },
+    Reprojection { layer: String, source: GdalError },
     TooLarge { most: usize },
     TooSmall { size_m: f64, tolerance_m: f64 },
     UnevenScale { ends: [[f64; 2]; 2], off_percent: f64, crs: String },
@@ -26,18 +30,43 @@ pub enum Error {
     NotWgs84 { driver: &'static str, layer: String },
     Folder { driver: &'static str },
     NotKept { driver: &'static str, layer: String, difference: Difference },
-    File { action: &'static str, path: String, reason: String },
+    File { action: Action, path: PathBuf, source: io::Error },
     Exists { path: String, remedy: &'static str },
-    Gdal(gdal::errors::GdalError),
+    Gdal(GdalError),
     Core(meshmark_core::Error),
 }
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// An action on a file or a folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)] // the names are the documentation
+pub enum Action {
+    Reading,
+    Writing,
+    WritingInto,
+    Making,
+    MovingAway,
+    Replacing,
+}
+
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Action::Reading => "reading",
+            Action::Writing => "writing",
+            Action::WritingInto => "writing into",
+            Action::Making => "making",
+            Action::MovingAway => "moving away",
+            Action::Replacing => "replacing",
+        })
+    }
+}
+
 /// Creates the error of an action on a file.
-pub fn file_error(action: &'static str, path: &Path, error: io::Error) -> Error {
-    Error::File { action, path: path.display().to_string(), reason: error.to_string() }
+pub fn file_error(action: Action, path: &Path, source: io::Error) -> Error {
+    Error::File { action, path: path.into(), source }
 }
 
 impl fmt::Display for Error {
@@ -46,10 +75,21 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Geometry { source, .. } => Some(source),
+            Error::Reprojection { source, .. } => Some(source),
+            Error::File { source, .. } => Some(source),
+            Error::Gdal(source) => Some(source),
+            Error::Core(source) => Some(source),
+            _ => None,
+        }
+    }
+}
 
-impl From<gdal::errors::GdalError> for Error {
-    fn from(error: gdal::errors::GdalError) -> Self {
+impl From<GdalError> for Error {
+    fn from(error: GdalError) -> Self {
         Error::Gdal(error)
     }
 }
@@ -99,13 +139,13 @@ impl Error {
                 "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are further away than any place in the \
                  CRS of the map: correct the feature, or leave it out"
             ),
-            Error::Geometry { layer, fid, reason } => format!("layer \"{layer}\", feature {fid}: {reason}"),
+            Error::Geometry { layer, fid, source } => format!("layer \"{layer}\", feature {fid}: {source}"),
             Error::Unreadable { layer, reason } => {
                 format!("layer \"{layer}\" cannot be read to its end: {reason}")
             }
-            Error::Reprojection { layer, reason } => {
+            Error::Reprojection { layer, source } => {
                 format!(
-                    "coordinates of layer \"{layer}\" cannot be brought into the CRS of the reference: {reason}"
+                    "coordinates of layer \"{layer}\" cannot be brought into the CRS of the reference: {source}"
                 )
             }
             Error::TooLarge { most } => format!("the map has more than {most} vertices: cut it into sheets"),
@@ -149,7 +189,7 @@ impl Error {
                 "layer \"{layer}\": {driver} has not kept what was written ({difference}): nothing is written; {}",
                 difference.remedy()
             ),
-            Error::File { action, path, reason } => format!("{action} {path} failed: {reason}"),
+            Error::File { action, path, source } => format!("{action} {} failed: {source}", path.display()),
             Error::Exists { path, remedy } => format!("{path} exists: {remedy}"),
             Error::Gdal(error) => error.to_string(),
             Error::Core(error) => error.text(spelling),

@@ -2,6 +2,7 @@
 
 use crate::{
     CoordinateSystem, Error, Outline, Result, extent::Extent, selection::chosen_layers, turns::turn,
+    wkb::GeometryFault,
 };
 use gdal::{Dataset, vector::LayerAccess};
 
@@ -40,9 +41,10 @@ pub fn features(
                 let Ok(geometry) = feature.geometry_by_index(column) else { continue };
                 let fid = feature.fid();
                 let id = || fid.map_or("without id".into(), |fid| fid.to_string());
-                let failed = |reason: String| Error::Geometry { layer: name.clone(), fid: id(), reason };
-                let wkb = geometry.iso_wkb().map_err(|error| failed(error.to_string()))?;
-                let outline = Outline::of_wkb(wkb).map_err(|error| failed(error.to_string()))?;
+                let failed =
+                    |source: GeometryFault| Error::Geometry { layer: name.clone(), fid: id(), source };
+                let wkb = geometry.iso_wkb().map_err(|error| failed(error.into()))?;
+                let outline = Outline::of_wkb(wkb).map_err(|error| failed(error.into()))?;
                 outline.chains.iter().flatten().try_for_each(|&point| extent.check(point, &name, id))?;
                 all.push(FeatureGeometry { layer: name.clone(), fid, outline });
             }

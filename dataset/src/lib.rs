@@ -33,10 +33,10 @@ pub mod workplace;
 
 pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
-pub use error::{Error, Result, file_error};
+pub use error::{Action, Error, Result, file_error};
 pub use features::{FeatureGeometry, features};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};
-pub use selection::{LabelFields, MOST_VERTICES, Selection, TargetCrs};
-pub use survey::{Survey, survey};
+pub use selection::{LabelFields, MOST_VERTICES, Selection};
+pub use survey::{Numbers, Survey, numbers, survey};
 pub use threads::{ThreadPool, threads};

@@ -6,7 +6,11 @@
 //! a single rename. Side files in the way are moved into the workplace first, and back if the
 //! publication fails.
 
-use crate::{Error, Result, error::file_error, file_id::same_file};
+use crate::{
+    Error, Result,
+    error::{Action, file_error},
+    file_id::same_file,
+};
 use std::{
     ffi::OsStr,
     fs::{self, File},
@@ -46,7 +50,7 @@ impl Publication {
     pub fn run(&self, workplace: &Path) -> Result<()> {
         self.sync_content()?;
         let journal = workplace.join(JOURNAL);
-        write_durably(&journal, &self.to_bytes()).map_err(|e| file_error("writing", &journal, e))?;
+        write_durably(&journal, &self.to_bytes()).map_err(|e| file_error(Action::Writing, &journal, e))?;
         let done = self.put_in_place();
         if done.is_err() {
             self.undo();
@@ -56,7 +60,7 @@ impl Publication {
 
     fn put_in_place(&self) -> Result<()> {
         for Move { from, to } in &self.retired {
-            fs::rename(from, to).map_err(|e| file_error("moving away", from, e))?;
+            fs::rename(from, to).map_err(|e| file_error(Action::MovingAway, from, e))?;
         }
         for companion in &self.companions {
             link(companion)?;
@@ -66,7 +70,7 @@ impl Publication {
         match self.overwrite {
             false => link(&self.main)?,
             true => fs::rename(&self.main.from, &self.main.to)
-                .map_err(|e| file_error("replacing", &self.main.to, e))?,
+                .map_err(|e| file_error(Action::Replacing, &self.main.to, e))?,
         }
         // The main file is in its place, so nothing may fail any more. If the power fails now, old
         // and new files are both whole.
@@ -96,7 +100,9 @@ impl Publication {
     /// empty files.
     fn sync_content(&self) -> Result<()> {
         for Move { from, .. } in self.companions.iter().chain([&self.main]) {
-            File::open(from).and_then(|file| file.sync_all()).map_err(|e| file_error("writing", from, e))?;
+            File::open(from)
+                .and_then(|file| file.sync_all())
+                .map_err(|e| file_error(Action::Writing, from, e))?;
         }
         Ok(())
     }
@@ -155,13 +161,15 @@ fn link(Move { from, to }: &Move) -> Result<()> {
         ErrorKind::AlreadyExists => {
             Error::Exists { path: to.display().to_string(), remedy: "move it away, or give another name" }
         }
-        _ => file_error("making", to, error),
+        _ => file_error(Action::Making, to, error),
     })
 }
 
 fn sync_folder(path: &Path) -> Result<()> {
     let folder = path.parent().unwrap_or(path);
-    File::open(folder).and_then(|folder| folder.sync_all()).map_err(|e| file_error("writing into", folder, e))
+    File::open(folder)
+        .and_then(|folder| folder.sync_all())
+        .map_err(|e| file_error(Action::WritingInto, folder, e))
 }
 
 fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {

@@ -5,7 +5,7 @@
 
 use crate::{
     decimals::Digits,
-    wkb::{self, WkbError},
+    wkb::{self, GeometryFault, WkbError},
 };
 use gdal::vector::{Feature, Layer, LayerAccess};
 use meshmark_core::counted;
@@ -29,6 +29,8 @@ pub enum Difference {
     },
     /// Coordinates became equal with these digits, and the driver wrote one of them.
     Merged(Digits),
+    /// A geometry cannot be read.
+    Unreadable(GeometryFault),
     /// Any other difference, in a few words.
     Other(String),
 }
@@ -38,6 +40,12 @@ const OTHER_FORMAT: &str = "choose another format or its options";
 impl From<String> for Difference {
     fn from(words: String) -> Self {
         Difference::Other(words)
+    }
+}
+
+impl From<GeometryFault> for Difference {
+    fn from(fault: GeometryFault) -> Self {
+        Difference::Unreadable(fault)
     }
 }
 
@@ -53,6 +61,7 @@ impl fmt::Display for Difference {
                 counted(*meant, "feature")
             ),
             Difference::Merged(digits) => write!(f, "coordinates become equal, written with {digits}"),
+            Difference::Unreadable(fault) => fault.fmt(f),
             Difference::Other(words) => f.write_str(words),
         }
     }
@@ -184,24 +193,25 @@ impl ReadBack<'_> {
         }
     }
 
-    fn meant(&self, feature: &Feature) -> Result<Vec<[f64; 2]>, String> {
+    fn meant(&self, feature: &Feature) -> Result<Vec<[f64; 2]>, Difference> {
         let place = |point| {
-            (self.place)(point).ok_or("a coordinate was not there when the map was marked".to_string())
+            let unknown = || "a coordinate was not there when the map was marked".to_string().into();
+            (self.place)(point).ok_or_else(unknown)
         };
         coords(feature)?.into_iter().map(place).collect()
     }
 }
 
-fn coords(feature: &Feature) -> Result<Vec<[f64; 2]>, String> {
+fn coords(feature: &Feature) -> Result<Vec<[f64; 2]>, GeometryFault> {
     let mut coords = Vec::new();
     // A written layer has one geometry column; a null geometry has no coordinates.
     if let Ok(geometry) = feature.geometry_by_index(0) {
-        let mut bytes = geometry.iso_wkb().map_err(|error| error.to_string())?;
+        let mut bytes = geometry.iso_wkb()?;
         let mut visit = |_, point: [f64; 2]| {
             coords.push(point.map(|v| v + 0.0)); // −0.0 becomes 0.0
             Ok(point)
         };
-        wkb::map_coordinates::<WkbError>(&mut bytes, &mut visit).map_err(|error| error.to_string())?;
+        wkb::map_coordinates::<WkbError>(&mut bytes, &mut visit)?;
     }
     Ok(coords)
 }

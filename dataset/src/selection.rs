@@ -1,6 +1,6 @@
 //! The selection: the parts of a dataset to read, and the way to read them.
 
-use crate::{CoordinateSystem, Error, Result};
+use crate::{Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::options::join_list;
 
@@ -28,17 +28,6 @@ impl LabelFields<'_> {
     }
 }
 
-/// The CRS in which coordinates are read.
-#[derive(Debug, Clone, Copy)]
-pub enum TargetCrs<'a> {
-    /// Their own, which all chosen layers must share.
-    Own,
-    /// This one; layers in another CRS are reprojected.
-    Crs(&'a CoordinateSystem),
-    /// None: the numbers are read unchanged.
-    Raw,
-}
-
 /// The parts of a dataset to read, and the way to read them.
 #[derive(Clone, Copy)]
 pub struct Selection<'a> {
@@ -48,8 +37,6 @@ pub struct Selection<'a> {
     pub srs: Option<&'a str>,
     /// Attributes that become labels.
     pub labels: LabelFields<'a>,
-    /// The CRS in which coordinates are read.
-    pub target: TargetCrs<'a>,
     /// Whether to keep the geometries.
     pub geometries: bool,
     /// A map of more vertices, duplicates included, is refused.
@@ -67,7 +54,6 @@ impl Default for Selection<'_> {
             layers: None,
             srs: None,
             labels: LabelFields::None,
-            target: TargetCrs::Own,
             geometries: false,
             most_vertices: MOST_VERTICES,
             last_failure: &|| None,

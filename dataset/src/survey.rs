@@ -6,7 +6,7 @@ use crate::{
     crs::{self, reproject},
     extent::Extent,
     labels, parse_srs, polylines,
-    selection::{LabelFields, Selection, TargetCrs, chosen_layers},
+    selection::{LabelFields, Selection, chosen_layers},
     turns::turn,
 };
 use gdal::{
@@ -19,7 +19,7 @@ use meshmark_core::{
     map_data::{Label, MapData, Polyline},
     scale::ScaleLattice,
 };
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 /// A map as marking and verification read it.
 #[derive(Debug)]
@@ -80,66 +80,138 @@ impl Survey {
     }
 }
 
-/// Reads the vertices, the CRS and the labels of a dataset.
+/// Reads the vertices, the CRS and the labels of a dataset whose layers share one CRS.
 ///
 /// # Errors
 /// Fails on a layer that does not exist or cannot be read to its end, layers of different CRS,
 /// coordinates that are not finite, and a CRS without a metric.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
-    let chosen = chosen_layers(dataset, selection.layers)?;
-    let mut walk =
-        Walk { selection, crs: None, chains: Chains::default(), labels: Vec::new(), polylines: Vec::new() };
-    let mut features = BTreeMap::new();
-    for (index, name) in &chosen {
-        let _turn = turn(dataset, name)?;
-        features.insert(*index, walk.layer(&mut dataset.layer(*index)?, name)?);
+    let Walk { found, crs, .. } = Walk::over(dataset, selection, true)?;
+    found.survey(crs.and_then(|(_, crs)| crs), selection.geometries)
+}
+
+/// Reads the vertices and the labels of a dataset, whose layers may be in any CRS.
+///
+/// # Errors
+/// Fails on a layer that does not exist or cannot be read to its end, and on coordinates that are
+/// not finite.
+pub fn numbers(dataset: &Dataset, selection: &Selection) -> Result<Numbers> {
+    let Walk { found, parts, .. } = Walk::over(dataset, selection, false)?;
+    Ok(Numbers { found, parts })
+}
+
+/// The numbers of a dataset before they are brought into one CRS.
+pub struct Numbers {
+    found: Found,
+    parts: Vec<Part>,
+}
+
+impl Numbers {
+    /// Returns the map in this CRS; layers without a CRS are assumed to be in it.
+    ///
+    /// # Errors
+    /// Fails on coordinates that cannot be reprojected, and on a CRS without a metric.
+    pub fn in_crs(&self, target: &CoordinateSystem) -> Result<Survey> {
+        let mut found = self.found.clone();
+        for Part { layer, crs, coords, labels, polylines } in &self.parts {
+            let bring = |points: &mut [[f64; 2]]| reproject(points, crs.as_ref(), target, layer);
+            bring(&mut found.chains.coords[coords.clone()])?;
+            let labels = &mut found.labels[labels.clone()];
+            let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
+            bring(&mut points)?;
+            labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
+            let polylines = &mut found.polylines[polylines.clone()];
+            let mut vertices: Vec<_> = polylines.iter().flat_map(|line| &line.vertices).copied().collect();
+            bring(&mut vertices)?;
+            let places = polylines.iter_mut().flat_map(|line| &mut line.vertices);
+            places.zip(vertices).for_each(|(place, vertex)| *place = vertex);
+        }
+        found.survey(Some(target.clone()), false)
     }
-    let crs = match selection.target {
-        TargetCrs::Crs(target) => Some(target.clone()),
-        TargetCrs::Own | TargetCrs::Raw => walk.crs.and_then(|(_, crs)| crs),
-    };
-    let mut chains = walk.chains;
-    let coords = std::mem::take(&mut chains.coords);
-    let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
-    let data = MapData { labels: walk.labels, polylines: walk.polylines, ..data };
-    let ground = match crs::ground(crs.as_ref(), &data.vertices) {
-        Ok(ground) => Some(ground),
-        Err(Error::NoCrs) => None,
-        Err(other) => return Err(other),
-    };
-    let lattice =
-        crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&data.vertices, ground));
-    let geometries = selection.geometries.then(|| Geometries::new(indices, chains));
-    Ok(Survey { data, crs, ground, lattice, geometries, features })
+
+    /// Returns the map with its numbers unchanged and without a CRS.
+    ///
+    /// # Errors
+    /// Fails on too many coordinates.
+    pub fn raw(self) -> Result<Survey> {
+        self.found.survey(None, false)
+    }
+}
+
+/// A geometry column of a layer. The labels and polylines of a layer belong to its first column.
+struct Part {
+    layer: String,
+    crs: Option<CoordinateSystem>,
+    coords: Range<usize>,
+    labels: Range<usize>,
+    polylines: Range<usize>,
+}
+
+/// The content of a dataset in the order of reading.
+#[derive(Clone, Default)]
+struct Found {
+    chains: Chains,
+    labels: Vec<Label>,
+    polylines: Vec<Polyline>,
+    features: BTreeMap<usize, u64>,
+}
+
+impl Found {
+    fn survey(self, crs: Option<CoordinateSystem>, keeps_geometries: bool) -> Result<Survey> {
+        let Found { mut chains, labels, polylines, features } = self;
+        let coords = std::mem::take(&mut chains.coords);
+        let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
+        let data = MapData { labels, polylines, ..data };
+        let ground = match crs::ground(crs.as_ref(), &data.vertices) {
+            Ok(ground) => Some(ground),
+            Err(Error::NoCrs) => None,
+            Err(other) => return Err(other),
+        };
+        let lattice =
+            crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&data.vertices, ground));
+        let geometries = keeps_geometries.then(|| Geometries::new(indices, chains));
+        Ok(Survey { data, crs, ground, lattice, geometries, features })
+    }
 }
 
 struct Walk<'a> {
     selection: &'a Selection<'a>,
+    /// Whether the layers must share one CRS, and their coordinates lie in its extent.
+    in_one_crs: bool,
     /// The first layer with vertices, and its CRS.
     crs: Option<(String, Option<CoordinateSystem>)>,
-    chains: Chains,
-    labels: Vec<Label>,
-    polylines: Vec<Polyline>,
+    found: Found,
+    parts: Vec<Part>,
 }
 
-impl Walk<'_> {
+impl<'a> Walk<'a> {
+    fn over(dataset: &Dataset, selection: &'a Selection<'a>, in_one_crs: bool) -> Result<Self> {
+        let mut walk = Walk { selection, in_one_crs, crs: None, found: Found::default(), parts: Vec::new() };
+        for (index, name) in &chosen_layers(dataset, selection.layers)? {
+            let _turn = turn(dataset, name)?;
+            let features = walk.layer(&mut dataset.layer(*index)?, name)?;
+            walk.found.features.insert(*index, features);
+        }
+        Ok(walk)
+    }
+
     /// Reads a layer and returns its number of features.
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<u64> {
         let columns = self.columns(layer)?;
-        let (first_label, first_polyline) = (self.labels.len(), self.polylines.len());
+        let (mut first_label, mut first_polyline) = (self.found.labels.len(), self.found.polylines.len());
         let mut of_column = vec![Chains::default(); columns.len()];
         let mut features = 0;
         for feature in layer.features() {
             features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
-                let extent = match self.selection.target {
-                    TargetCrs::Own => Extent::in_crs(columns[column].as_ref()),
-                    TargetCrs::Crs(_) | TargetCrs::Raw => Extent::ANY, // its true CRS may differ
+                let extent = match self.in_one_crs {
+                    true => Extent::in_crs(columns[column].as_ref()),
+                    false => Extent::ANY, // its true CRS may differ
                 };
                 read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
             }
-            let vertices =
-                self.chains.coords.len() + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
+            let vertices = self.found.chains.coords.len()
+                + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
             if vertices > self.selection.most_vertices {
                 return Err(Error::TooLarge { most: self.selection.most_vertices });
             }
@@ -148,24 +220,20 @@ impl Walk<'_> {
         if let Some(reason) = (self.selection.last_failure)() {
             return Err(Error::Unreadable { layer: name.into(), reason });
         }
-        for (crs, chains) in columns.iter().zip(&mut of_column) {
-            match self.selection.target {
-                TargetCrs::Crs(target) => reproject(&mut chains.coords, crs.as_ref(), target, name)?,
-                TargetCrs::Own if !chains.coords.is_empty() => self.check_crs(name, crs)?,
-                TargetCrs::Own | TargetCrs::Raw => {}
+        for (crs, mut chains) in columns.into_iter().zip(of_column) {
+            if self.in_one_crs && !chains.coords.is_empty() {
+                self.check_crs(name, &crs)?;
             }
-            self.chains.append(chains);
-        }
-        if let (TargetCrs::Crs(target), Some(crs)) = (self.selection.target, columns.first()) {
-            let labels = &mut self.labels[first_label..];
-            let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
-            reproject(&mut points, crs.as_ref(), target, name)?;
-            labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
-            let polylines = &mut self.polylines[first_polyline..];
-            let mut vertices: Vec<_> = polylines.iter().flat_map(|line| &line.vertices).copied().collect();
-            reproject(&mut vertices, crs.as_ref(), target, name)?;
-            let places = polylines.iter_mut().flat_map(|line| &mut line.vertices);
-            places.zip(vertices).for_each(|(place, vertex)| *place = vertex);
+            let start = self.found.chains.coords.len();
+            self.found.chains.append(&mut chains);
+            self.parts.push(Part {
+                layer: name.into(),
+                crs,
+                coords: start..self.found.chains.coords.len(),
+                labels: first_label..self.found.labels.len(),
+                polylines: first_polyline..self.found.polylines.len(),
+            });
+            (first_label, first_polyline) = (self.found.labels.len(), self.found.polylines.len());
         }
         Ok(features)
     }
@@ -181,8 +249,8 @@ impl Walk<'_> {
             return;
         }
         let Ok(geometry) = geometry.to_geo() else { return };
-        labels::of_feature(feature, &geometry, &self.selection.labels, &mut self.labels);
-        polylines::of_geometry(&geometry, &mut self.polylines);
+        labels::of_feature(feature, &geometry, &self.selection.labels, &mut self.found.labels);
+        polylines::of_geometry(&geometry, &mut self.found.polylines);
     }
 
     /// Returns the CRS of every geometry column of a layer.
@@ -247,5 +315,26 @@ mod tests {
             let map = survey(&dataset, &selection).unwrap();
             assert_eq!(map.data.vertices.coords(), [[1000.0, 1.0], [2000.0, 2.0]]);
         }
+    }
+
+    #[test]
+    fn every_layer_is_brought_from_its_own_crs_and_the_numbers_stay() {
+        let mut dataset =
+            DriverManager::get_driver_by_name("Memory").unwrap().create_vector_only("").unwrap();
+        for (epsg, place) in [(4326, "POINT (10 50)"), (3857, "POINT (1113194.9079 6446275.8410)")] {
+            let srs = gdal::spatial_ref::SpatialRef::from_epsg(epsg).unwrap();
+            let ty = OGRwkbGeometryType::wkbPoint;
+            let options = LayerOptions { name: "places", ty, srs: Some(&srs), ..Default::default() };
+            let mut layer = dataset.create_layer(options).unwrap();
+            layer.create_feature(Geometry::from_wkt(place).unwrap()).unwrap();
+        }
+        assert!(survey(&dataset, &Selection::default()).is_err(), "the layers share no CRS");
+        let numbers = numbers(&dataset, &Selection::default()).unwrap();
+        let map = numbers.in_crs(&parse_srs("EPSG:3857").unwrap()).unwrap();
+        let [a, b] = map.data.vertices.coords() else { panic!("{:?}", map.data.vertices.coords()) };
+        assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3, "{a:?} {b:?}");
+        let raw = numbers.raw().unwrap();
+        assert_eq!(raw.data.vertices.coords(), [[10.0, 50.0], [1113194.9079, 6446275.841]]);
+        assert!(raw.crs.is_none());
     }
 }

@@ -15,6 +15,21 @@ pub enum WkbError {
     NoHeader,
 }
 
+/// The reason why a geometry cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+#[allow(missing_docs)] // the messages are the documentation
+pub enum GeometryFault {
+    Gdal(Box<gdal::errors::GdalError>),
+    Wkb(#[from] WkbError),
+}
+
+impl From<gdal::errors::GdalError> for GeometryFault {
+    fn from(error: gdal::errors::GdalError) -> Self {
+        GeometryFault::Gdal(Box::new(error))
+    }
+}
+
 const MOST_NESTED: usize = 64;
 
 /// The role of a coordinate pair: it begins a sequence (ring, line, point) or is joined to the pair

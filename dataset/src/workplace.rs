@@ -5,7 +5,11 @@
 //! left by a killed process: the next process that writes to the same folder undoes a partial
 //! publication ([`crate::publication::recover`]) and removes the workplace.
 
-use crate::{Result, error::file_error, publication};
+use crate::{
+    Result,
+    error::{Action, file_error},
+    publication,
+};
 use std::{
     ffi::OsStr,
     fs::{self, File, Permissions, TryLockError},
@@ -31,7 +35,7 @@ pub struct Workplace {
 impl Workplace {
     /// Removes the workplaces of killed processes in `parent` and makes a workplace there.
     pub fn new(parent: &Path) -> Result<Self> {
-        let failed = |e: io::Error| file_error("writing into", parent, e);
+        let failed = |e: io::Error| file_error(Action::WritingInto, parent, e);
         let parent = parent.canonicalize().map_err(failed)?;
         loop {
             // Staged files are unmarked, so no other user may read them.
@@ -60,7 +64,7 @@ impl Workplace {
     /// Makes a folder in it.
     pub fn subfolder(&self, name: &str) -> Result<PathBuf> {
         let path = self.folder.join(name);
-        fs::create_dir(&path).map_err(|e| file_error("making", &path, e))?;
+        fs::create_dir(&path).map_err(|e| file_error(Action::Making, &path, e))?;
         Ok(path)
     }
 
@@ -71,7 +75,7 @@ impl Workplace {
             let mut peers = fs::read(&path).unwrap_or_default();
             peers.extend_from_slice(other.folder.as_os_str().as_bytes());
             peers.push(0);
-            fs::write(&path, peers).map_err(|e| file_error("writing", &path, e))?;
+            fs::write(&path, peers).map_err(|e| file_error(Action::Writing, &path, e))?;
         }
         Ok(())
     }

@@ -60,7 +60,7 @@ impl Power {
         let parameters = mark.parameters;
         let displacement_m =
             displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
-        let linework = Linework::new(matched.reference.data, &matched.reference.ground);
+        let linework = LineIndex::new(matched.reference.data, &matched.reference.ground);
         let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
         let trial = {
             let suspect = (matched.suspect, &matched.registration);
@@ -88,13 +88,13 @@ fn trial_key(matched: &Matched) -> SecretKey {
 }
 
 /// The segments of a reference, and its vertices without a segment, in the plane.
-struct Linework<'a> {
+struct LineIndex<'a> {
     ground: &'a Ground,
     plane: Plane,
     tree: RTree<Edge>,
 }
 
-impl<'a> Linework<'a> {
+impl<'a> LineIndex<'a> {
     fn new(reference: &'a MapData, ground: &'a Ground) -> Self {
         let (coords, centre) = (reference.vertices.coords(), reference.vertices.centre());
         let plane = Plane::new(ground, centre);
@@ -102,7 +102,7 @@ impl<'a> Linework<'a> {
         reference.segments.as_flattened().iter().for_each(|&vertex| alone[vertex as usize] = false);
         let points = (0..coords.len() as u32).filter(|&vertex| alone[vertex as usize]).map(|v| [v, v]);
         let tree = plane.tree(coords, reference.segments.iter().copied().chain(points));
-        Linework { ground, plane, tree }
+        LineIndex { ground, plane, tree }
     }
 
     /// Returns where a place of the suspect goes when the vertices of the reference move, CRS

@@ -61,12 +61,12 @@ impl<'a> Tracking<'a> {
     /// # Errors
     /// Returns the errors of the estimation.
     pub fn follow(&self, carriers: usize, parameters: &Parameters) -> Result<Followed> {
-        let (fit, radius) = (Fit { tracking: self, carriers, parameters }, self.matched.radius);
-        let mut best = fit.follow(self.reference().vertices.coords(), radius)?;
+        let (follower, radius) = (Follower { tracking: self, carriers, parameters }, self.matched.radius);
+        let mut best = follower.follow(self.reference().vertices.coords(), radius)?;
         if radius.reason == RadiusReason::Noise
             && let Some(expected) = self.shifted_groups()
         {
-            let next = fit.follow(&expected, self.radius_around(&expected, RadiusReason::Groups))?;
+            let next = follower.follow(&expected, self.radius_around(&expected, RadiusReason::Groups))?;
             if next.information() > CLEARLY_MORE * best.information() {
                 best = next;
             }
@@ -76,7 +76,7 @@ impl<'a> Tracking<'a> {
             && is_far
             && let Some(expected) = self.matched.grown()
         {
-            let next = fit.follow(expected, self.radius_around(expected, RadiusReason::Deformation))?;
+            let next = follower.follow(expected, self.radius_around(expected, RadiusReason::Deformation))?;
             if self.kept_segments(&next) > KEEPS_MORE * self.kept_segments(&best) {
                 best = next;
             }
@@ -140,18 +140,18 @@ impl<'a> Tracking<'a> {
     }
 }
 
-/// The fit of a disturbance to the displacements of matched vertices.
-struct Fit<'a> {
+/// Follows the disturbance that fits the displacements of matched vertices.
+struct Follower<'a> {
     tracking: &'a Tracking<'a>,
     carriers: usize,
     parameters: &'a Parameters,
 }
 
-impl Fit<'_> {
+impl Follower<'_> {
     /// Matches around the expected places of the reference vertices, CRS units, and then around
     /// those that the fitted disturbance predicts.
     fn follow(&self, expected: &[[f64; 2]], radius: Radius) -> Result<Followed> {
-        let Fit { tracking, carriers, parameters } = *self;
+        let Follower { tracking, carriers, parameters } = *self;
         let (patches, amplitude_m) = (&tracking.matched.reference.patches, parameters.amplitude_m);
         let mut matches = tracking.match_joined(expected, radius.metres);
         let mut observed = tracking.displacements(&matches);
@@ -179,7 +179,7 @@ impl Fit<'_> {
     }
 
     fn predict(&self, observed: &Observed) -> Result<Prediction> {
-        let Fit { tracking, carriers, parameters } = *self;
+        let Follower { tracking, carriers, parameters } = *self;
         let patches = &tracking.matched.reference.patches;
         let deformation = Deformation::estimate(patches, observed, carriers, parameters)?;
         Ok(deformation.predict(patches, observed, carriers, parameters.amplitude_m))

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Runs test_ogrsf, GDAL's own test of what a vector driver must do, on maps read through MESHMARK.
+# Runs test_ogrsf, GDAL's own conformance test of vector drivers, on maps read through MESHMARK.
 #
-#   run.sh         build test_ogrsf if need be, then run it; needs the plugin and the command line
+#   run.sh         build test_ogrsf if necessary, then run it; needs the plugin and the command line
 #                  tool, both built in release mode
 #   run.sh build   only build test_ogrsf
 #   run.sh with P  run P, the test_ogrsf of another GDAL, whose ogr2ogr comes first in PATH
 #
 # Debian packages no test_ogrsf: it is compiled here, once, from the source package of the very
 # libgdal-dev that is installed. All files go to target/conformance; apt's configuration, lists and
-# caches are private to it, so the system's stay as they are.
+# caches are private to it, so those of the system stay unchanged.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)

@@ -16,7 +16,7 @@
 
 static atomic_long calls;
 
-/* Whether this call shall fail for want of space. */
+/* Returns whether this call fails for lack of space. */
 static int disk_is_full(void)
 {
     const char *fault = getenv("FAULT"), *at = getenv("FAULT_AT");
@@ -49,7 +49,7 @@ __attribute__((destructor)) static void report(void)
 
 #define REAL(name, type) ((type)dlsym(RTLD_NEXT, name))
 
-/* What is printed is no file. */
+/* Printed output goes to no file. */
 static int is_terminal(const void *stream)
 {
     return stream == stdout || stream == stderr;
@@ -78,7 +78,7 @@ FAILS_WITH(-1, int, linkat, (int a, const char *from, int b, const char *to, int
 FAILS_WITH(-1, int, rename, (const char *from, const char *to), (const char *, const char *), (from, to))
 FAILS_WITH(-1, int, mkdir, (const char *path, mode_t mode), (const char *, mode_t), (path, mode))
 
-/* A full disk does not keep anybody from removing files. */
+/* A full disk does not prevent the removal of files. */
 #define COUNTED(result, name, parameters, types, arguments)                                                 \
     result name parameters                                                                                  \
     {                                                                                                       \

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Builds GDAL 3.12.1 with its programs and test_ogrsf into a new folder: the drivers that the tests
-# use, on Debian's libraries. Installs what it needs. Takes half an hour on two cores.
-# Usage: build_gdal.sh FOLDER DATA: DATA is the folder of data of another GDAL 3.12; the crate of
-# gdal_source.sh has not all.
+# use, on Debian's libraries. Installs missing packages. Takes half an hour on two cores.
+# Usage: build_gdal.sh FOLDER DATA: DATA is the data folder of another GDAL 3.12, as the crate of
+# gdal_source.sh lacks some of its files.
 set -euo pipefail
 
 readonly drivers=(GPKG SQLITE FLATGEOBUF CSV GML KML LIBKML TAB DXF VRT) # and Shapefile, GeoJSON, MEM, GTiff: always built
@@ -36,6 +36,6 @@ cmake -S "$work/source" -B "$work/build" -G Ninja "${options[@]}" >"$log" 2>&1 &
     echo "build_gdal.sh: GDAL does not build; all that was said is in $log" >&2
     exit 1
 }
-# Not among what is installed; where it is started, LD_LIBRARY_PATH names the library.
+# This program is not installed; LD_LIBRARY_PATH names the library where it is started.
 cp "$work/build/apps/test_ogrsf" "$folder/bin/"
 rm -rf "$work" "$log"

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Reads a report as people do, in Chromium, installed where it is missing: no error, no request,
-# pages of A4. Pictures of it go to the folder that is named:
+# Opens a report in Chromium, as its readers do: there must be no error, no request, and pages of A4.
+# Installs Chromium where it is missing. Writes pictures into the folder that is named:
 # `host-tests/hosts/chromium.sh docs/images` draws those of the documents again.
 pictures=$(realpath -m "${1:-/nonexistent}")
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 install_missing chromium fonts-liberation fonts-dejavu-core gdal-bin imagemagick poppler-utils python3
 
-# chromium OPTION... PAGE, without a screen; its log and what it requests are kept.
+# chromium OPTION... PAGE: runs without a screen; keeps its log and its requests.
 chromium() {
     local page=${*: -1}
     timeout 120 /usr/bin/chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --no-first-run \
@@ -16,7 +16,7 @@ chromium() {
         >"$work/out" 2>"$work/log" || fail "Chromium fails on $page: $(tail -n 5 "$work/log")"
 }
 
-# Network requests of pages; Chromium makes some requests of its own.
+# Prints network requests of pages; Chromium makes some requests of its own.
 requests() {
     "${python[@]}" - "$work/net.json" <<'END'
 import json, sys
@@ -40,7 +40,7 @@ ogr2ogr -f GPKG -t_srs EPSG:4326 -spat 385449 6671699 385800 6672000 suspect.gpk
     >"$work/out" && fail "another map is not inconclusive"
 "$meshmark" compare reference.gpkg marked.gpkg --report comparison.html >"$work/out"
 
-# A page that does all this, so that the checks below are known to see it.
+# This page makes every fault, which proves that the checks below notice it.
 echo '<!DOCTYPE html><title>x</title><img src="http://127.0.0.1:9/x"><script>console.error("seen")</script>' >wrong.html
 chromium --screenshot="$work/wrong.png" wrong.html
 [ -n "$(console)" ] && [ -n "$(requests)" ] || fail "errors and requests of a page would not be seen"
@@ -71,7 +71,7 @@ draw phone 390,1850 match.html --
 draw grey 900,1850 match.html -- -colorspace Gray
 draw comparison 900,1850 comparison.html --
 draw inconclusive 900,900 inconclusive.html --
-# Dark is dark and grey is grey.
+# The dark page is dark, and the grey print is grey.
 brightness() { convert "report-$1.png" -colorspace Gray -format '%[fx:100*mean]' info: | cut -d. -f1; }
 [ "$(brightness desktop)" -gt 70 ] && [ "$(brightness dark)" -lt 40 ] || fail "there is no dark page"
 if [ -d "$pictures" ]; then cp report-*.png "$pictures"; fi

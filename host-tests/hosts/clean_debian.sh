@@ -4,7 +4,7 @@ as_root=()
 [ "$(id -u)" -eq 0 ] || as_root=(sudo)
 trap '"${as_root[@]}" rm -rf "$work"' EXIT
 
-# new_root SUITE FOLDER: a Debian with nothing but apt.
+# new_root SUITE FOLDER: makes a Debian with apt alone.
 new_root() {
     local mirror
     mirror=$(apt-get indextargets --format '$(SITE)' 'Codename: bookworm' 'Created-By: Packages' 2>/dev/null |
@@ -13,9 +13,9 @@ new_root() {
         fail "debootstrap: $(tail -n 5 "$work/log")"
 }
 
-# in_root FOLDER WHAT COMMAND: runs COMMAND there, in /root; it trusts whom this machine trusts. The
-# folders of the array `mounts`, "FROM TO", are seen there while it runs and no longer, so that
-# removing a root never reaches them. Sets `seconds` to how long it took.
+# in_root FOLDER WHAT COMMAND: runs COMMAND there, in /root, with the certificates of this machine.
+# The folders of the array `mounts`, "FROM TO", are mounted only while it runs, so that the removal
+# of a root never reaches them. Sets `seconds` to the duration.
 mounts=()
 in_root() {
     local folder=$1 what=$2 command=$3 mount from to begin=$EPOCHREALTIME

@@ -1,4 +1,4 @@
-# Sourced by the scripts of this folder, which then are in a new folder with two keys, and have the
+# Sourced by the scripts of this folder: changes into a new folder with two keys, and selects the
 # driver of target/release. The output of programs is kept beside that folder.
 set -euo pipefail
 

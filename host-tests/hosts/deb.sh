@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian package into a clean root, uses it there as the README describes, and removes
-# it. Installs debootstrap where it is missing, and needs root, or sudo, for the clean root.
+# it again. Installs debootstrap where it is missing, and needs root, or sudo, for the clean root.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 source "$hosts/clean_debian.sh"
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# In a clean Debian of another suite, with the GDAL and the QGIS that it has: runs the tests, and
-# the QGIS plugin with qgis_plugin.sh. Installs debootstrap where it is missing, and needs root, or
+# Runs the tests, and the QGIS plugin with qgis_plugin.sh, in a clean Debian of another suite with its
+# GDAL and its QGIS. Installs debootstrap where it is missing, and needs root, or
 # sudo.
 # Usage: debian.sh SUITE
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -12,8 +12,8 @@ install_missing debootstrap
 new_root "$suite" "$debian"
 mounts=("$(rustc --print sysroot) /opt/rust" "$root /meshmark")
 
-# here WHAT COMMAND: in the checkout, where what is compiled stays, apart from that for this
-# machine's GDAL.
+# here WHAT COMMAND: runs in the checkout, whose programs are kept apart from those for this machine's
+# GDAL.
 here() {
     in_root "$debian" "$1" "cd /meshmark && export CARGO_TARGET_DIR=/meshmark/target/$suite && $2"
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the examples and verifies what they made; postgis.sh runs that of PostGIS. Installs Python's
+# Runs the examples and verifies their outputs; postgis.sh runs the one for PostGIS. Installs Python's
 # GDAL and MapServer where they are missing; the driver for pyogrio's wheel is that of
 # `make plugin-for-wheel`.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"

@@ -1,11 +1,11 @@
-"""The working folder, where the hosts read and write."""
+"""The working folder, in which the hosts read and write."""
 
 import contextlib
 import os
 
 
 def state():
-    """Name and content of every file of the folder, hidden ones and folders included."""
+    """Returns name and content of every file in the folder, including hidden files and folders."""
     found = {}
     for folder, folders, files in os.walk("."):
         found.update((os.path.join(folder, name), None) for name in folders)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds GDAL 3.12 where it is missing, then driver and command with it, and runs on it the tests of
-# every crate that uses GDAL, and test_ogrsf. Also lets each of the two GDALs meet the driver of
+# every crate that uses GDAL, and test_ogrsf. Also runs each of the two GDALs with the driver of
 # the other.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -9,7 +9,7 @@ gdal=$folder/gdal
 wheel=$root/target/wheel/python/bin/python
 crates=(-p meshmark-dataset -p meshmark-plugin -p meshmark-verifier -p meshmark-host-tests -p meshmark-cgal)
 
-# with_3_12 COMMAND...: what it starts, compiles and links are of GDAL 3.12.
+# with_3_12 COMMAND...: runs it with programs, headers and libraries of GDAL 3.12.
 with_3_12() {
     env -u GDAL_DRIVER_PATH PATH="$gdal/bin:$PATH" LD_LIBRARY_PATH="$gdal/lib" PKG_CONFIG_PATH="$gdal/lib/pkgconfig" \
         CARGO_TARGET_DIR="$folder/target" "$@"

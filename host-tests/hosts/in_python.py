@@ -79,7 +79,7 @@ def fail_between_two_features():
 
 
 def copy_for(recipient, more=(), **selection):
-    """Writes copy.gpkg as docs/driver.md shows it; whether its check passes."""
+    """Writes copy.gpkg as docs/driver.md shows it, and returns whether its check passes."""
     options = ["KEY=key.json", f"RECIPIENT={recipient}", f"REFERENCE={recipient}.gpkg", f"RECORD={recipient}.json", *more]
     try:
         written = gdal.VectorTranslate(

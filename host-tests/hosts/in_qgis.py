@@ -70,7 +70,7 @@ def is_refused(why, *arguments, **options):
 
 
 def small_layer():
-    """A square of one metre, which is too small to be marked."""
+    """Returns a square of one metre, which is too small to be marked."""
     layer = QgsVectorLayer("Polygon?crs=EPSG:3067", "small", "memory")
     feature = QgsFeature()
     feature.setGeometry(QgsGeometry.fromWkt("POLYGON ((0 0,1 0,1 1,0 1,0 0))"))

@@ -18,7 +18,7 @@ from qgis.PyQt.QtWidgets import QApplication, QDockWidget, QToolBar, QToolButton
 from qgis.utils import iface, reloadPlugin
 
 WORK, PICTURES = os.environ["MESHMARK_WORK"], os.environ["MESHMARK_PICTURES"]
-# For a dialog to open, and for a run to end, seconds.
+# Times within which a dialog opens and a run ends, seconds.
 PATIENCE = 120
 
 
@@ -60,7 +60,7 @@ def context_menu_entry():
 
 
 def is_in_menu_and_toolbar():
-    """Once, also after the plugin was loaded again; and the entries work."""
+    """Each entry exists once, also after the plugin is loaded again, and works."""
     assert reloadPlugin("meshmark")
     entries = ["Export with watermark…", "Verify suspect map…", "Compare original and marked map…", "New key…"]
     submenus = [a.menu() for a in iface.pluginMenu().actions() if a.menu() and a.text().replace("&", "") == "meshmark"]
@@ -109,7 +109,7 @@ def export_by_context_menu():
 
 
 def leak(marked, suspect):
-    """The western half of a map."""
+    """Returns the western half of a map."""
     dataset = gdal.OpenEx(marked)
     west, east, south, north = dataset.GetLayer(0).GetExtent()
     half = [west, south, (west + east) / 2, north]

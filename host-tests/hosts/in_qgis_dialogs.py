@@ -23,7 +23,7 @@ ADVANCED = QgsProcessingParameterDefinition.Flag.FlagAdvanced
 def open_dialog(name, width=980):
     algorithm = QgsApplication.processingRegistry().createAlgorithmById(f"meshmark:{name}")
     dialog = algorithm.createCustomParametersWidget(None) or qgis_dialog.AlgorithmDialog(algorithm)
-    # QGIS restores the size of the last one.
+    # QGIS restores the size of the last dialog.
     dialog.show()
     dialog.resize(width, 700)
     QgsApplication.processEvents()
@@ -108,7 +108,7 @@ def texts(boxes):
 
 
 def buttons_are_in_reach():
-    """Also beside layers with long names, and in a narrow dialog."""
+    """Buttons are visible, also beside layers with long names and in a narrow dialog."""
     for name in ("export", "verify", "compare"):
         dialog = open_dialog(name, width=560)
         open_advanced(dialog)
@@ -178,7 +178,7 @@ def layer(name):
     return made
 
 
-# With widgets, which a platform without a screen draws nowhere.
+# The application has widgets, which a platform without a screen draws nowhere.
 application = QgsApplication([], True)
 application.initQgis()
 Processing.initialize()

@@ -68,7 +68,7 @@ def fails(why, name, layers, feedback=None, **options):
 
 
 class Cancelling(QgsProcessingFeedback):
-    """Cancels when the algorithm logs a message, or a little later."""
+    """Cancels when the algorithm logs a message, or slightly later."""
 
     def __init__(self, text, seconds):
         super().__init__(False)
@@ -80,7 +80,7 @@ class Cancelling(QgsProcessingFeedback):
 
 
 def memory_layer():
-    """A copy in memory with one edit that is not saved: a feature less."""
+    """Returns a copy in memory with one unsaved edit: a feature less."""
     source = of_map("buildings")
     layer = QgsVectorLayer(f"Polygon?crs={source.crs().authid()}", "in memory", "memory")
     layer.dataProvider().addAttributes([f for f in source.fields() if f.name() != "fid"])
@@ -182,7 +182,7 @@ def no_layers():
 
 
 def verification_fails(what, why, evidence, report, feedback=None):
-    """Of a suspect that is a filtered layer: the copy of what it shows goes, too."""
+    """A filtered layer is a suspect: the temporary copy of its features is removed, too."""
     import processing
 
     suspect = of_map("buildings", "filtered.gpkg")
@@ -208,7 +208,7 @@ def both_files_or_none():
 
 
 def no_command(name, content):
-    """A program in the settings that is not meshmark is one sentence, too."""
+    """A program in the settings that is not meshmark causes one sentence, too."""
     import processing
 
     path = f"{HERE}/{name}"
@@ -228,7 +228,7 @@ def no_command(name, content):
 
 
 def impostor(name, *lines):
-    """A program in the place of ogr2ogr that ends with exit code 0."""
+    """Makes a program in place of ogr2ogr that ends with exit code 0."""
     path = f"{HERE}/{name}.sh"
     with open(path, "w", encoding="utf-8") as file:
         file.write("\n".join(["#!/bin/sh", *lines, "exit 0", ""]))
@@ -281,7 +281,7 @@ def figures_are_per_cent():
 
 
 def model(has_output, recipient="ACME GmbH"):
-    """Export, then verify what was exported."""
+    """Exports a map, then verifies it."""
 
     def child(name, values):
         algorithm = QgsProcessingModelChildAlgorithm(f"meshmark:{name}")

@@ -42,7 +42,7 @@ tables() {
 }
 
 packages=(gdal-bin postgresql)
-# PostGIS itself is named after the version of PostgreSQL.
+# The package of PostGIS is named after the version of PostgreSQL.
 [ -n "$(find /usr/share/postgresql -name postgis.control 2>/dev/null)" ] || packages+=(postgresql-postgis)
 install_missing "${packages[@]}"
 trap stop_server EXIT
@@ -56,7 +56,7 @@ ogr2ogr -f GPKG reference.gpkg "PG:$connection"
 verify "a copy in a file" reference.gpkg marked.gpkg --record acme.json
 verify "the database as the reference" "PG:$connection" marked.gpkg --record acme.json
 
-# One table, and into the database: a copy is written by PostgreSQL's own driver.
+# Marks one table into the database, in which PostgreSQL's own driver writes the copy.
 rm acme.json
 ogr2ogr -f PostgreSQL "PG:$connection" "MESHMARK:PG:$connection tables=buildings" "${key[@]}" -oo RECORD=acme.json \
     -nln marked

@@ -13,7 +13,7 @@ export PATH=$build:$PATH
 chmod 700 "$work"
 profile=$HOME/.local/share/QGIS/QGIS3/profiles/default
 
-# The zip.
+# Checks the zip.
 make -s -C "$root" qgis QGIS_ZIP="$work/a.zip"
 (umask 077 && sleep 2 && make -s -C "$root" qgis QGIS_ZIP="$work/b.zip")
 cmp "$work/a.zip" "$work/b.zip" || fail "the zip is not the same twice"
@@ -39,7 +39,7 @@ logged() {
     grep -qF -- "$2" "$work/log" || fail "$1: \"$2\" is not in the log: $(cat "$work/log")"
 }
 
-# Names as people give them.
+# Tests names as users give them.
 maps="$PWD/Karten für ACME"
 mkdir "$maps" "$maps/records"
 cp "$fixture" "$maps/map.gpkg"
@@ -70,7 +70,7 @@ logged "compare" "NEWLY_INVALID:	0"
 grep -q 'DISPLACEMENT_RMS_M:	0\.[01]' "$work/log" || fail "compare: the displacement is not that of a mark: $(cat "$work/log")"
 passed "compare gives its figures"
 
-# The commands of docs/qgis.md, but for the first, which was given above.
+# Runs the commands of docs/qgis.md except for the first, which is above.
 mkdir example example/records
 cp "$fixture" example/map.gpkg
 mv suspect.gpkg example/
@@ -122,7 +122,7 @@ refused "export, the driver is missing" "The GDAL driver MESHMARK is not install
 PATH=${PATH#"$build:"} run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json" RECORD="$base.json"
 refused "verify, the command is missing" "The command meshmark is not installed"
 
-# Where the settings name them, driver and command need not be where they are looked for.
+# If the settings name driver and command, these may be anywhere.
 mkdir -p "$profile/QGIS"
 cp "$profile/QGIS/QGIS3.ini" "$work/QGIS3.ini" 2>/dev/null || touch "$work/QGIS3.ini"
 printf '\n[meshmark]\ndriver_folder=%s\ncommand=%s\n' "$build/gdalplugins" "$meshmark" >>"$profile/QGIS/QGIS3.ini"
@@ -146,7 +146,7 @@ done
 
 timeout 300 "${python[@]}" "$hosts/in_qgis_dialogs.py" "$profile/python/plugins" 2>"$work/log" || fail "$(cat "$work/log")"
 
-# In QGIS itself.
+# Runs in QGIS itself.
 mkdir "$work/desktop" "$work/desktop/records" "$work/pictures"
 cp "$fixture" "$work/desktop/map.gpkg"
 cp key.json "$work/desktop/"

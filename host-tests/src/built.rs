@@ -1,4 +1,5 @@
-//! What cargo built, unless its sources are newer: a test must not pass on yesterday's programs.
+//! The programs that cargo built, unless their sources are newer: no test may pass with outdated
+//! programs.
 
 use crate::Result;
 use std::{
@@ -7,10 +8,10 @@ use std::{
     time::SystemTime,
 };
 
-/// The folder of what cargo built: the one of this program, for a test the one above.
+/// Returns the folder that cargo builds into: that of this program, for a test the one above.
 ///
 /// # Errors
-/// The operating system does not name this program.
+/// Fails if the operating system does not name this program.
 pub fn folder() -> Result<PathBuf> {
     let program = std::env::current_exe()?;
     let folder = program.parent().ok_or("this program has no folder")?;
@@ -21,7 +22,7 @@ pub fn folder() -> Result<PathBuf> {
 /// file NAME.d.
 ///
 /// # Errors
-/// A sentence that names the file, the source and the remedy.
+/// Fails with a sentence that names the file, the source and the remedy.
 pub fn check(file: &Path, rule: &Path) -> Result<()> {
     const REMEDY: &str = "run `make build` first";
     let built = modified(file).ok_or_else(|| format!("{} is missing: {REMEDY}", file.display()))?;
@@ -38,7 +39,7 @@ fn modified(path: &Path) -> Option<SystemTime> {
     path.metadata().and_then(|metadata| metadata.modified()).ok()
 }
 
-/// The files on the right of a rule; a space in a name follows a backslash.
+/// Returns the files on the right of a rule; a backslash precedes a space in a name.
 fn sources(rule: &str) -> Vec<PathBuf> {
     let (_, files) = rule.split_once(": ").unwrap_or_default();
     files.replace("\\ ", "\0").split_whitespace().map(|file| file.replace('\0', " ").into()).collect()

@@ -1,4 +1,4 @@
-//! All that a dataset holds, for comparing two of them feature by feature.
+//! The content of a dataset, for the comparison of two datasets feature by feature.
 
 use gdal::{
     Dataset,
@@ -7,7 +7,7 @@ use gdal::{
 use meshmark_dataset::wkb::{self, WkbError};
 use std::{collections::HashMap, path::Path};
 
-/// A layer, read whole.
+/// A layer with all its features.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerContents {
     /// Its name.
@@ -53,14 +53,14 @@ pub fn read_layer(layer: &mut Layer) -> LayerContents {
 }
 
 impl LayerContents {
-    /// Every coordinate of every geometry.
+    /// Returns every coordinate of every geometry.
     pub fn coords(&self) -> Vec<[f64; 2]> {
         let geometries = self.features.iter().flat_map(|f| f.geometries.iter().flatten());
         geometries.flat_map(|wkb| coords(wkb)).collect()
     }
 }
 
-/// The coordinates of a geometry.
+/// Returns the coordinates of a geometry.
 pub fn coords(wkb: &[u8]) -> Vec<[f64; 2]> {
     let mut coords = Vec::new();
     let mut keep = |_, point| {
@@ -71,18 +71,18 @@ pub fn coords(wkb: &[u8]) -> Vec<[f64; 2]> {
     coords
 }
 
-/// A geometry's bytes with every coordinate pair zeroed: type, structure, Z and M.
+/// Returns the bytes of a geometry with every coordinate pair zeroed: type, structure, Z and M.
 fn skeleton(wkb: &[u8]) -> Vec<u8> {
     let mut bytes = wkb.to_vec();
     wkb::map_coordinates::<WkbError>(&mut bytes, &mut |_, _| Ok([0.0, 0.0])).unwrap();
     bytes
 }
 
-/// Where every vertex of `before` is in `after`.
+/// Returns where every vertex of `before` is in `after`.
 ///
 /// # Panics
-/// Unless the two differ in nothing but coordinates, and each vertex went to one place wherever it
-/// occurs.
+/// Panics unless the two differ in nothing but coordinates, and all occurrences of a vertex move to
+/// one place.
 #[track_caller]
 pub fn moves(before: &[LayerContents], after: &[LayerContents]) -> Vec<([f64; 2], [f64; 2])> {
     let names = |layers: &[LayerContents]| layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>();
@@ -110,7 +110,7 @@ fn moves_of_geometry(before: Option<&[u8]>, after: Option<&[u8]>, places: &mut H
     }
 }
 
-/// The root mean square and the largest of the lengths of moves, CRS units.
+/// Returns the root mean square and the largest length of moves, CRS units.
 pub fn lengths(moves: &[([f64; 2], [f64; 2])]) -> (f64, f64) {
     let lengths = moves.iter().map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]));
     let (sum, max) = lengths.fold((0.0, 0f64), |(sum, max), d| (sum + d * d, max.max(d)));

@@ -1,4 +1,4 @@
-//! Faults while a marked map is written, and what must hold afterwards.
+//! Faults during the writing of a marked map, and the state that must hold afterwards.
 
 use crate::{
     plugin::{Host, Run},
@@ -11,45 +11,44 @@ use std::{
 
 const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/faults/fault.c");
 
-/// What goes wrong. Calls are those that change files.
+/// A fault. Only calls that change files count.
 #[derive(Debug, Clone, Copy)]
 pub enum Fault {
     /// The process is killed at the n-th call.
     Kill(usize),
-    /// The process is killed after so many seconds.
+    /// The process is killed after this number of seconds.
     KillAfter(f64),
     /// The disk is full from the n-th call on.
     FullDisk(usize),
-    /// No file can be larger than so many bytes.
+    /// No file can be larger than this number of bytes.
     FileSize(usize),
 }
 
-/// A host in which writing can be made to fail, with a small map, and perhaps a target that is
-/// there already.
+/// A host with faults, a small map, and perhaps an existing target.
 pub struct Scene {
     /// The host.
     pub host: Host,
     preload: PathBuf,
     target: String,
     options: Vec<String>,
-    /// What the target was before.
+    /// The content of the target before.
     before: Option<Vec<u8>>,
 }
 
-/// How a scene ended.
+/// The outcome of a scene.
 #[derive(Debug, PartialEq, Clone, Copy)]
 pub enum Outcome {
     /// The complete output is there.
     Complete,
-    /// Everything is as it was.
+    /// Everything is unchanged.
     Previous,
 }
 
 impl Scene {
-    /// Prepares a scene; with `replaces` there is a target, and OVERWRITE=YES.
+    /// Prepares a scene; with `replaces` the target exists, and OVERWRITE=YES.
     ///
     /// # Panics
-    /// When the C compiler fails.
+    /// Panics when the C compiler fails.
     pub fn new(target: &str, replaces: bool) -> Self {
         let host = Host::new();
         fs::write(host.path("in.geojson"), points(400, "")).unwrap();
@@ -78,20 +77,20 @@ impl Scene {
         Scene { host, preload, target: target.into(), options, before }
     }
 
-    /// Writes the map, with a fault.
+    /// Writes the map with a fault.
     pub fn write(&self, fault: Option<Fault>) -> Run {
         let options: Vec<&str> = self.options.iter().map(String::as_str).collect();
         let arguments = Host::create_arguments(&self.target, "in.geojson", &options);
         run(&self.host, &self.preload, "ogr2ogr", &arguments, fault)
     }
 
-    /// How many calls change files when nothing fails.
+    /// Returns the number of calls that change files when nothing fails.
     pub fn count_calls(&self) -> usize {
         self.write(None).succeeds();
         calls(&self.host)
     }
 
-    /// Asserts that the output is complete or as it was, and says which.
+    /// Asserts that the output is complete or unchanged, and returns which.
     #[track_caller]
     pub fn outcome(&self, context: &str) -> Outcome {
         let now = fs::read(self.host.path(&self.target)).ok();
@@ -104,7 +103,7 @@ impl Scene {
         Outcome::Complete
     }
 
-    /// Writes with a fault and asserts all that must hold; how it ended.
+    /// Writes with a fault, asserts everything that must hold, and returns the outcome.
     #[track_caller]
     pub fn survives(&self, fault: Fault) -> Outcome {
         let run = self.write(Some(fault));
@@ -120,12 +119,12 @@ impl Scene {
         outcome
     }
 
-    /// The same command again removes what a killed one left, and does its work where that is still
-    /// to be done.
+    /// Asserts that the same command, repeated, removes the files of a killed one and does the
+    /// remaining work.
     #[track_caller]
     fn check_next_run(&self, outcome: Outcome, context: &str) {
         let next = self.write(None);
-        // In this case the reference is in the way of another one.
+        // The existing reference prevents a second one then.
         let done_before = outcome == Outcome::Complete;
         assert_eq!(next.code == Some(0), !done_before, "{context}\nnext: {}", next.stderr);
         assert_eq!(self.outcome(context), Outcome::Complete);
@@ -144,7 +143,7 @@ impl Scene {
         assert_eq!(companions, if outcome == Outcome::Complete { 2 } else { 0 }, "{context}: {parts:?}");
     }
 
-    /// Back to where it began.
+    /// Restores the initial state.
     pub fn reset(&self) {
         for name in self.host.names() {
             let path = self.host.path(&name);
@@ -160,7 +159,7 @@ impl Scene {
     }
 }
 
-/// A program runs in the host's folder, with a fault.
+/// Runs a program in the host's folder with a fault.
 fn run(host: &Host, preload: &Path, program: &str, arguments: &[String], fault: Option<Fault>) -> Run {
     let (kind, at) = match fault {
         Some(Fault::Kill(at)) => ("kill", at.to_string()),
@@ -180,7 +179,7 @@ fn run(host: &Host, preload: &Path, program: &str, arguments: &[String], fault: 
     let (preload, log) = (preload.display().to_string(), log(host).display().to_string());
     let variables =
         [("LD_PRELOAD", preload.as_str()), ("FAULT", kind), ("FAULT_AT", &at), ("FAULT_LOG", &log)];
-    // Shells and timers shall not fail, only the program.
+    // Only the program fails, not its shell or timer.
     let variables = if before.len() == 0 { &variables[..] } else { &[] };
     host.run_with(line[0], &line[1..], variables)
 }
@@ -189,23 +188,24 @@ fn log(host: &Host) -> PathBuf {
     host.plugins().join("calls")
 }
 
-/// How many calls of the last program changed files.
+/// Returns the number of calls of the last program that changed files.
 fn calls(host: &Host) -> usize {
     fs::read_to_string(log(host)).unwrap().trim().parse().unwrap()
 }
 
-/// `meshmark distribute` to three recipients, which can be made to fail.
+/// A run of `meshmark distribute` for three recipients, with faults.
 pub struct Distribution {
     /// The host.
     pub host: Host,
     preload: PathBuf,
     format: &'static str,
-    /// What the folder of the copies holds when nothing fails: names, and what GDAL reads of maps.
+    /// The content of the folder of the copies when nothing fails: names, and what GDAL reads of
+    /// maps.
     complete: Vec<(String, String)>,
 }
 
 impl Distribution {
-    /// Prepares it, and lets it succeed once.
+    /// Prepares a distribution, and runs it once without faults.
     pub fn new(format: &'static str) -> Self {
         let host = Host::new();
         fs::write(host.path("in.geojson"), points(400, "")).unwrap();
@@ -219,14 +219,14 @@ impl Distribution {
         distribution
     }
 
-    /// How many calls change files when nothing fails.
+    /// Returns the number of calls that change files when nothing fails.
     pub fn count_calls(&self) -> usize {
         self.reset();
         self.run(None).succeeds();
         calls(&self.host)
     }
 
-    /// Takes the copies away.
+    /// Removes the copies.
     pub fn reset(&self) {
         drop(fs::remove_dir_all(self.host.path("out")));
     }
@@ -238,13 +238,16 @@ impl Distribution {
         run(&self.host, &self.preload, self.host.meshmark().to_str().unwrap(), &arguments, fault)
     }
 
-    /// Runs with a fault and asserts that every copy that is there is complete, and that the same
-    /// command again makes the rest and leaves nothing else; how many copies there were before
-    /// that.
+    /// Runs with a fault, and asserts that every existing copy is complete and that the same
+    /// command, repeated, makes the rest and leaves nothing else. Returns the number of copies
+    /// before the repetition.
     #[track_caller]
     pub fn survives(&self, fault: Fault) -> usize {
         let failed = self.run(Some(fault));
         let context = format!("{fault:?}: {:?} {}", failed.code, failed.stderr);
+        if matches!(fault, Fault::FullDisk(_) | Fault::FileSize(_)) {
+            assert!(matches!(failed.code, Some(0 | 5 | 7)), "a full disk is not the user's: {context}");
+        }
         let is_main =
             |name: &String| !name.starts_with('.') && [".gpkg", ".shp"].iter().any(|e| name.ends_with(e));
         let there = if self.host.path("out").is_dir() { self.contents() } else { Vec::new() };
@@ -282,7 +285,8 @@ impl Distribution {
     }
 }
 
-/// A GeoJSON map of points in degrees; `#` in the properties is the number of each.
+/// Returns a GeoJSON map of points in degrees; `#` in the properties stands for the number of a
+/// point.
 pub fn points(count: usize, properties: &str) -> String {
     let feature = |i: usize| {
         let (x, y) = (25.0 + (i % 20) as f64 * 0.001 + i as f64 * 1e-5, 60.0 + (i / 20) as f64 * 0.001);
@@ -295,8 +299,8 @@ pub fn points(count: usize, properties: &str) -> String {
     format!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, features.join(","))
 }
 
-/// A shell script that runs its arguments with a limit on the size of files, as an error instead of
-/// a signal.
+/// Returns a shell script that runs its arguments with a limit on the size of files, which causes
+/// errors instead of signals.
 fn limited(bytes: usize) -> String {
     format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", bytes / 512) // POSIX: units of 512 bytes
 }

@@ -1,5 +1,5 @@
-//! What tests, studies and benchmarks share: the hosts that use the product, the product as its
-//! users have it, and what happens to maps.
+//! The library that tests, studies and benchmarks share: the hosts that use the product, the
+//! product as its users have it, and what happens to maps.
 //!
 //! - [`plugin`]: GDAL's programs with the driver, in a folder of their own; [`contents`]: what a
 //!   dataset holds

@@ -1,4 +1,4 @@
-//! The driver as a user has it: GDAL's own programs, the plugin in a folder, a key file.
+//! The driver as a user has it: GDAL's own programs, the plugin in a folder, and a key file.
 
 use crate::{built, product::marking_arguments};
 use meshmark_core::key::SecretKey;
@@ -9,10 +9,10 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// The plugin that cargo built; the command `meshmark` is beside it.
+/// Returns the plugin that cargo built; the command `meshmark` is beside it.
 ///
 /// # Panics
-/// When one of them is missing, or older than its sources.
+/// Panics when one of them is missing or older than its sources.
 pub fn library() -> PathBuf {
     let folder = built::folder().unwrap();
     let library = folder.join("libmeshmark_plugin.so");
@@ -22,7 +22,7 @@ pub fn library() -> PathBuf {
     library
 }
 
-/// A fixture's path.
+/// Returns the path of a fixture.
 pub fn fixture(name: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")).join(name)
 }
@@ -40,7 +40,7 @@ impl Default for Host {
 }
 
 impl Host {
-    /// Sets the folder up.
+    /// Creates the folder.
     pub fn new() -> Self {
         let host = Host { work: tempfile::tempdir().unwrap(), plugins: tempfile::tempdir().unwrap() };
         std::os::unix::fs::symlink(library(), host.plugins.path().join("ogr_MESHMARK.so")).unwrap();
@@ -48,32 +48,32 @@ impl Host {
         host
     }
 
-    /// The key in `key.json`.
+    /// Returns the key in `key.json`.
     pub fn key(&self) -> SecretKey {
         SecretKey::from_bytes([0xc5; 32])
     }
 
-    /// The key's secret as the key file has it: must never be seen elsewhere.
+    /// Returns the key's secret as the key file has it; no other file may hold it.
     pub fn secret(&self) -> String {
         "c5".repeat(32)
     }
 
-    /// The folder.
+    /// Returns the folder.
     pub fn folder(&self) -> &Path {
         self.work.path()
     }
 
-    /// Where GDAL's programs find the plugin.
+    /// Returns the folder in which GDAL's programs find the plugin.
     pub fn plugins(&self) -> &Path {
         self.plugins.path()
     }
 
-    /// The names of what is in the folder, sorted.
+    /// Returns the names of the files in the folder, sorted.
     pub fn names(&self) -> Vec<String> {
         self.files().into_iter().map(|(name, _)| name).collect()
     }
 
-    /// A file of the folder.
+    /// Returns the path of a file in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.work.path().join(name)
     }
@@ -83,7 +83,7 @@ impl Host {
         fs::copy(fixture(fixture_name), self.path(name)).unwrap();
     }
 
-    /// What is in the folder: names and contents.
+    /// Returns names and contents of the files in the folder.
     pub fn files(&self) -> Vec<(String, Vec<u8>)> {
         let entries = fs::read_dir(self.work.path()).unwrap().map(|entry| entry.unwrap().path());
         let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
@@ -98,7 +98,7 @@ impl Host {
         self.run_with(program, arguments, &[])
     }
 
-    /// The same with configuration options.
+    /// Runs a program of GDAL in the folder, with the plugin and with configuration options.
     pub fn run_with(&self, program: &str, arguments: &[&str], configuration: &[(&str, &str)]) -> Run {
         let mut command = Command::new(program);
         command.args(arguments).current_dir(self.work.path());
@@ -116,8 +116,8 @@ impl Host {
         }
     }
 
-    /// The command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a recipient,
-    /// the reference `ref.gpkg`, the record `record.json` and more options.
+    /// Returns the command line of `ogr2ogr -f MESHMARK MESHMARK:target source` with the key, a
+    /// recipient, the reference `ref.gpkg`, the record `record.json` and more options.
     pub fn create_arguments(target: &str, source: &str, more: &[&str]) -> Vec<String> {
         let options = ["KEY=key.json", "RECIPIENT=ACME GmbH", "REFERENCE=ref.gpkg", "RECORD=record.json"];
         let named = |name: &str| {
@@ -129,18 +129,19 @@ impl Host {
         fixed.into_iter().chain(options).chain(more.iter().map(|o| o.to_string())).collect()
     }
 
-    /// Runs that.
+    /// Runs the command line of [`Host::create_arguments`].
     pub fn create(&self, target: &str, source: &str, more: &[&str]) -> Run {
         let arguments = Self::create_arguments(target, source, more);
         self.run("ogr2ogr", &arguments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// The command `meshmark` that cargo built.
+    /// Returns the path of the command `meshmark` that cargo built.
     pub fn meshmark(&self) -> PathBuf {
         library().with_file_name("meshmark")
     }
 
-    /// `meshmark verify --json` with the host's key; `more` holds flags and, last, the suspect.
+    /// Runs `meshmark verify --json` with the host's key; `more` holds flags and, last, the
+    /// suspect.
     pub fn verify(&self, reference: &str, more: &[&str]) -> (Run, serde_json::Value) {
         let command = self.meshmark();
         let mut arguments = vec!["verify", "--json", "--key", "key.json", "--reference", reference];
@@ -150,7 +151,7 @@ impl Host {
         (run, report)
     }
 
-    /// The report of a suspect that must match without a wrong bit.
+    /// Returns the report of a suspect that must match without a wrong bit.
     #[track_caller]
     pub fn matches(&self, reference: &str, more: &[&str]) -> serde_json::Value {
         let (run, report) = self.verify(reference, more);
@@ -161,7 +162,7 @@ impl Host {
         report
     }
 
-    /// `ogr2ogr -f FORMAT output MESHMARK:source` with the key, a recipient and more options.
+    /// Runs `ogr2ogr -f FORMAT output MESHMARK:source` with the key, a recipient and more options.
     pub fn mark(&self, format: &str, output: &str, source: &str, options: &[&str]) -> Run {
         let fixed = ["KEY=key.json", "RECIPIENT=ACME GmbH"].map(String::from);
         let fixed = marking_arguments(format, output, source, fixed);
@@ -172,14 +173,14 @@ impl Host {
     }
 }
 
-/// What a program did.
+/// The result of a program.
 pub struct Run {
     line: String,
-    /// Its exit code, none when a signal ended it.
+    /// Its exit code; `None` when a signal ended it.
     pub code: Option<i32>,
-    /// What it printed.
+    /// Its standard output.
     pub stdout: String,
-    /// What it complained about.
+    /// Its standard error.
     pub stderr: String,
 }
 
@@ -192,14 +193,14 @@ impl Run {
         self
     }
 
-    /// The failures of GDAL among its messages, but for the one that `ogr2ogr` ends with when a
-    /// source does not open: in GDAL 3.12 it is an `ERROR`, in 3.6 a `FAILURE`.
+    /// Returns the failures of GDAL among its messages, without the last one of `ogr2ogr` when a
+    /// source does not open: GDAL 3.12 prints it as an `ERROR`, GDAL 3.6 as a `FAILURE`.
     pub fn errors(&self) -> Vec<&str> {
         let is_last_word = |line: &&str| line.starts_with("ERROR 1: Unable to open datasource `");
         self.stderr.lines().filter(|line| line.starts_with("ERROR ") && !is_last_word(line)).collect()
     }
 
-    /// The warnings of GDAL among its messages.
+    /// Returns the warnings of GDAL among its messages.
     pub fn warnings(&self) -> Vec<&str> {
         self.stderr.lines().filter(|line| line.starts_with("Warning ")).collect()
     }

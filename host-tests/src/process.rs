@@ -1,4 +1,4 @@
-//! Processes: one timed, with its peak memory, and the C compiler.
+//! Processes: this module measures the time and the peak memory of one, and runs the C compiler.
 
 use crate::Result;
 use serde::Serialize;
@@ -11,17 +11,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How often a process is asked for its peak memory.
+/// Interval at which the peak memory of a process is read.
 const POLL: Duration = Duration::from_millis(2);
 
 /// One run of a process.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Run {
     pub seconds: f64,
-    /// Seconds of processor time, user and system, of all threads, and of children that were waited
-    /// for.
+    /// Seconds of processor time, user and system, of all threads and of finished children.
     pub processor_s: f64,
-    /// Of the process, or of it and its children together when there are any.
+    /// Peak memory of the process and its children together.
     pub peak_bytes: f64,
 }
 
@@ -29,15 +28,14 @@ impl Run {
     /// Runs a process to its end in `folder`, with one of these exit codes.
     ///
     /// # Errors
-    /// When it does not start, or ends otherwise: with what it said.
-    pub fn of(command: &mut Command, folder: &Path, exit_codes: &[i32]) -> Result<Self> {
+    /// Fails when it does not start or ends otherwise; the error holds its output.
+    pub fn measure(command: &mut Command, folder: &Path, exit_codes: &[i32]) -> Result<Self> {
         let messages = folder.join("messages.txt");
         command.current_dir(folder).stderr(File::create(&messages)?);
         let since = Instant::now();
         let mut child = command.spawn().map_err(|error| format!("{command:?}: {error}"))?;
         let mut peaks = HashMap::new();
-        // A process that has ended keeps its processor time, not its memory, until it is waited
-        // for.
+        // A process that has ended keeps its processor time, but not its memory, until `wait`.
         while !has_ended(&child) {
             note_peaks(child.id(), &mut peaks);
             sleep(POLL);
@@ -55,7 +53,7 @@ impl Run {
 /// Compiles a C source of a test or a benchmark into a program or a library.
 ///
 /// # Errors
-/// The C compiler cannot be run, or fails: with what it printed.
+/// Fails when the C compiler cannot be run or fails; the error holds its output.
 pub fn compile(source: &Path, arguments: &[&str], into: &Path) -> Result<()> {
     let output = Command::new("cc").arg(source).args(arguments).arg("-o").arg(into).output();
     let output = output.map_err(|error| format!("cc cannot be run: {error}"))?;
@@ -70,23 +68,23 @@ pub fn compile(source: &Path, arguments: &[&str], into: &Path) -> Result<()> {
 pub struct Runs(pub Vec<Run>);
 
 impl Runs {
-    /// The fewest seconds.
+    /// Returns the fewest seconds.
     pub fn best_s(&self) -> f64 {
         self.0.iter().map(|run| run.seconds).fold(f64::NAN, f64::min)
     }
 
-    /// The fewest seconds of processor time.
+    /// Returns the fewest seconds of processor time.
     pub fn processor_s(&self) -> f64 {
         self.0.iter().map(|run| run.processor_s).fold(f64::NAN, f64::min)
     }
 
-    /// The most memory.
+    /// Returns the most memory.
     pub fn peak_bytes(&self) -> f64 {
         self.0.iter().map(|run| run.peak_bytes).fold(f64::NAN, f64::max)
     }
 }
 
-/// The fields of /proc/PID/stat from the third, the state, on (proc(5)).
+/// Returns the fields of /proc/PID/stat from the third, the state, on (proc(5)).
 fn stat(child: &Child) -> Option<Vec<String>> {
     let text = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
     let (_, after_name) = text.rsplit_once(')')?;
@@ -104,7 +102,7 @@ fn processor_seconds(child: &Child) -> Option<f64> {
     Some((ticks(11)? + ticks(12)? + ticks(13)? + ticks(14)?) / TICKS_PER_SECOND)
 }
 
-/// Keeps the peak of a process and of its children.
+/// Keeps the peak memory of a process and of its children.
 fn note_peaks(process: u32, peaks: &mut HashMap<u32, f64>) {
     if let Some(bytes) = peak_memory(process) {
         peaks.insert(process, bytes);
@@ -129,7 +127,7 @@ mod tests {
     fn a_process_is_waited_for_and_its_failure_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let shell = |script: &str, codes: &[i32]| {
-            Run::of(Command::new("sh").args(["-c", script]), folder.path(), codes)
+            Run::measure(Command::new("sh").args(["-c", script]), folder.path(), codes)
         };
         let run = shell("sleep 0.05", &[0]).unwrap();
         assert!(run.seconds >= 0.05 && run.peak_bytes > 1e5, "{run:?}");

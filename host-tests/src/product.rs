@@ -18,7 +18,7 @@ pub struct Product {
     options: Vec<String>,
 }
 
-/// How the bits of the message become chips.
+/// The way in which the bits of the message become chips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Profile {
     pub code: &'static str,
@@ -26,15 +26,15 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The paper's: every bit is c chips.
+    /// Returns repetition as in the paper: every bit is c chips.
     pub const fn repetition(chip_rate: usize) -> Self {
         Profile { code: "REPETITION", chip_rate }
     }
 
-    /// 256 code bits of one chip each: the displacement of c = 2.
+    /// LDPC: 256 code bits of one chip each, with the displacement of c = 2.
     pub const LDPC: Profile = Profile { code: "LDPC", chip_rate: 1 };
 
-    /// A short name.
+    /// Returns a short name.
     pub fn name(&self) -> String {
         match self {
             &Profile::LDPC => "LDPC".into(),
@@ -43,7 +43,7 @@ impl Profile {
     }
 }
 
-/// How a copy is marked.
+/// The settings of a marked copy.
 #[derive(Debug, Clone, Copy)]
 pub struct Marking<'a> {
     pub key: &'a Path,
@@ -53,16 +53,16 @@ pub struct Marking<'a> {
     pub precision: f64,
 }
 
-/// Who is asked about when a suspect is verified.
+/// The copy for which a suspect is verified.
 #[derive(Debug, Clone, Copy)]
 pub enum Asked<'a> {
     /// The copy of this record.
     Record(&'a Path),
-    /// A copy marked like this.
+    /// A copy with these settings.
     Marking(Marking<'a>),
 }
 
-/// What `meshmark verify --json` prints, as far as it is used here.
+/// The part of the output of `meshmark verify --json` that is used here.
 #[derive(Debug, Clone, Deserialize)]
 #[allow(missing_docs)] // the names are those of the report
 pub struct Report {
@@ -78,7 +78,7 @@ pub struct Report {
     pub seconds: BTreeMap<String, f64>,
 }
 
-/// How the suspect was brought onto the reference.
+/// The registration of the suspect.
 #[derive(Debug, Clone, Deserialize)]
 #[allow(missing_docs)]
 pub struct Registration {
@@ -98,10 +98,10 @@ pub struct Vertices {
 }
 
 impl Product {
-    /// The build in a folder: `meshmark` and `gdalplugins/ogr_MESHMARK.so`.
+    /// Returns the build in a folder: `meshmark` and `gdalplugins/ogr_MESHMARK.so`.
     ///
     /// # Errors
-    /// A sentence that says which of them is missing.
+    /// Fails with a sentence that names the missing one.
     pub fn in_folder(folder: &Path) -> Result<Self> {
         // GDAL looks for the driver from wherever the host runs.
         let folder = folder.canonicalize().map_err(|e| format!("{}: {e}", folder.display()))?;
@@ -115,10 +115,10 @@ impl Product {
         Ok(product)
     }
 
-    /// The build this program or test belongs to.
+    /// Returns the build to which this program or test belongs.
     ///
     /// # Errors
-    /// As [`Product::in_folder`], and when a source is newer than the build.
+    /// Fails like [`Product::in_folder`], and when a source is newer than the build.
     pub fn of_this_build() -> Result<Self> {
         let folder = built::folder()?;
         let product = Self::in_folder(&folder)?;
@@ -127,31 +127,31 @@ impl Product {
         Ok(product)
     }
 
-    /// The same with further options of the driver, NAME=value.
+    /// Adds options of the driver, NAME=value.
     pub fn with_options(self, options: Vec<String>) -> Self {
         Product { options, ..self }
     }
 
-    /// What `meshmark --version` says.
+    /// Returns the output of `meshmark --version`.
     ///
     /// # Errors
-    /// The command cannot be run.
+    /// Fails when the command cannot be run.
     pub fn version(&self) -> Result<String> {
         let output = self.meshmark().arg("--version").output()?;
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_string())
     }
 
-    /// The command `meshmark`.
+    /// Returns the path of the command `meshmark`.
     pub fn meshmark(&self) -> Command {
         Command::new(&self.meshmark)
     }
 
-    /// The folder of the driver.
+    /// Returns the folder of the driver.
     pub fn plugins(&self) -> &Path {
         &self.plugins
     }
 
-    /// `ogr2ogr` with the driver.
+    /// Returns the command `ogr2ogr` with the driver.
     pub fn ogr2ogr(&self) -> Command {
         let mut command = Command::new("ogr2ogr");
         command.env("GDAL_DRIVER_PATH", &self.plugins);
@@ -161,7 +161,7 @@ impl Product {
     /// Marks `source` as the driver does on export, with a record beside the marked GeoPackage.
     ///
     /// # Errors
-    /// What ogr2ogr prints.
+    /// Fails with the output of `ogr2ogr`.
     pub fn mark(&self, source: &Path, marked: &Path, record: &Path, marking: Marking) -> Result<()> {
         let options = [
             ("KEY", marking.key.display().to_string()),
@@ -178,7 +178,7 @@ impl Product {
     /// product.
     ///
     /// # Errors
-    /// What ogr2ogr prints.
+    /// Fails with the output of `ogr2ogr`.
     pub fn export(
         &self,
         source: &Path,
@@ -200,7 +200,7 @@ impl Product {
     /// Verifies a suspect, on one thread.
     ///
     /// # Errors
-    /// What `meshmark` prints when it gives no verdict.
+    /// Fails with the output of `meshmark` when it gives no verdict.
     pub fn verify(
         &self,
         key: &Path,
@@ -224,7 +224,7 @@ impl Product {
                 .args(self.options.iter().map(|option| format!("--{}", option.to_lowercase()))),
         };
         let output = command.arg(suspect).output()?;
-        // 0 match, 1 no match, 3 inconclusive; all others are no answer.
+        // Codes 0 (match), 1 (no match) and 3 (inconclusive) are verdicts; all others are failures.
         match output.status.code() {
             Some(0 | 1 | 3) => Ok(serde_json::from_slice(&output.stdout)?),
             code => Err(format!("meshmark verify, exit code {code:?}: {}", printed(&output)).into()),
@@ -248,16 +248,16 @@ fn printed(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).trim().to_string()
 }
 
-/// Writes a key file with a secret that is no secret: experiments must be repeatable.
+/// Writes a key file whose secret follows from a seed, as experiments must be repeatable.
 ///
 /// # Errors
-/// The file cannot be written.
+/// Fails when the file cannot be written.
 pub fn write_key(path: &Path, seed: u64) -> Result<()> {
     let key = random_key(&mut Random::new(seed));
     Ok(std::fs::write(path, key.to_json().as_bytes())?)
 }
 
-/// The next key of a stream.
+/// Returns the next key of a stream.
 pub fn random_key(random: &mut Random) -> SecretKey {
     let mut secret = [0; 32];
     secret.chunks_mut(8).for_each(|bytes| bytes.copy_from_slice(&random.seed().to_le_bytes()));

@@ -1,9 +1,10 @@
-//! Larger maps made of a map: copies of it, side by side.
+//! Larger maps, which consist of copies of a map side by side.
 
 use crate::attacks::{Feature, Map};
 use geo::{Coord, MapCoords};
 
-/// So many copies of every feature, in rows of about as many columns; copies do not touch.
+/// Returns this number of copies of every feature, in about as many rows as columns; copies do not
+/// touch.
 pub fn tile(map: &Map, copies: usize) -> Map {
     let columns = (copies as f64).sqrt().ceil() as usize;
     let [width, height] = size(map).map(|length| 1.01 * length);
@@ -21,7 +22,7 @@ pub fn tile(map: &Map, copies: usize) -> Map {
     tiled
 }
 
-/// Width and height of what all layers cover, CRS units.
+/// Returns width and height of the extent of all layers, CRS units.
 fn size(map: &Map) -> [f64; 2] {
     let start = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     let [low, high] = map

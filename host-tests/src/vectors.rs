@@ -1,4 +1,4 @@
-//! The test vectors of fixtures/vectors: what `make_vectors` writes and tests/vectors.rs proves.
+//! The test vectors of fixtures/vectors, which `make_vectors` writes and tests/vectors.rs compares.
 
 use crate::plugin::fixture;
 use gdal::{Dataset, vector::LayerAccess};
@@ -22,25 +22,25 @@ use std::path::{Path, PathBuf};
 
 /// The recipient of the marked map.
 pub const RECIPIENT: &str = "ACME GmbH";
-/// How many values of a long sequence are written.
+/// Number of values that are written of a long sequence.
 const FIRST: usize = 8;
 
-/// The folder of the test vectors.
+/// Returns the folder of the test vectors.
 pub fn folder() -> PathBuf {
     fixture("vectors")
 }
 
-/// The reference map.
+/// Returns the path of the reference map.
 pub fn reference_path() -> PathBuf {
     fixture("kotka.gpkg")
 }
 
-/// The marked map.
+/// Returns the marked map.
 pub fn marked_path() -> PathBuf {
     folder().join("marked.gpkg")
 }
 
-/// The key, the bytes 0 to 31: it protects nothing.
+/// Returns the key, the bytes 0 to 31; it protects nothing.
 pub fn key() -> SecretKey {
     SecretKey::from_bytes(std::array::from_fn(|i| i as u8))
 }
@@ -48,16 +48,16 @@ pub fn key() -> SecretKey {
 /// Reads a map as the driver does.
 ///
 /// # Panics
-/// When it cannot be read: the kit is then of no use.
+/// Panics when it cannot be read.
 fn read(path: &Path) -> Survey {
     let dataset = Dataset::open(path).expect("a map GDAL opens");
     survey(&dataset, &Selection::default()).expect("a map of one CRS")
 }
 
-/// Every coordinate of a map, feature by feature.
+/// Returns every coordinate of a map, feature by feature.
 ///
 /// # Panics
-/// When it cannot be read.
+/// Panics when it cannot be read.
 pub fn coordinates(path: &Path) -> Vec<[f64; 2]> {
     let dataset = Dataset::open(path).expect("a map GDAL opens");
     let mut all = Vec::new();
@@ -74,7 +74,7 @@ pub fn coordinates(path: &Path) -> Vec<[f64; 2]> {
     all
 }
 
-/// The marking of the reference, with all that it is made of.
+/// The marking of the reference, with all values that determine it.
 pub struct ReferenceMarking {
     /// The vertices of the reference map.
     pub reference: VertexTable,
@@ -90,10 +90,10 @@ pub struct ReferenceMarking {
 }
 
 impl ReferenceMarking {
-    /// Marks the reference with today's code.
+    /// Marks the reference with the current code.
     ///
     /// # Panics
-    /// When it cannot be marked.
+    /// Panics when it cannot be marked.
     pub fn new() -> Self {
         let map = read(&reference_path());
         let on_ground = map.map().expect("a projected CRS");
@@ -106,7 +106,8 @@ impl ReferenceMarking {
         ReferenceMarking { reference: map.data.vertices, ground, parameters, message, marked, patches }
     }
 
-    /// Every intermediate value an implementer may want to compare, by the steps of the algorithm.
+    /// Returns every intermediate value that an implementer may want to compare, by the steps of
+    /// the algorithm.
     pub fn steps(&self) -> Value {
         let basis = self.basis(0);
         json!({
@@ -162,8 +163,8 @@ impl ReferenceMarking {
         Basis::low_frequencies(&self.patches.as_slice()[number], self.carriers() + 1).expect("it converges")
     }
 
-    /// Analysis of coordinates relative to the map's centre: the r_i of the paper, which marking
-    /// needs not.
+    /// Returns the analysis of coordinates relative to the map's centre: the r_i of the paper,
+    /// which marking does not need.
     fn coordinate_spectrum(&self, basis: &Basis) -> Value {
         let local = self.reference.local(1.0);
         let axis = |axis: usize| {
@@ -184,7 +185,7 @@ impl ReferenceMarking {
         })
     }
 
-    /// α p_i b′_j of one axis, after a 0 for the mean.
+    /// Returns α p_i b′_j of one axis, after a 0 for the mean.
     fn coefficients(&self, chips: &[f64]) -> Vec<f64> {
         let signs = self.parameters.code.encode(&self.message);
         let bit = |i: usize| signs[bit_of_coefficient(i + 1, self.parameters.chip_rate)];
@@ -206,7 +207,7 @@ impl ReferenceMarking {
         &self.patches.as_slice()[0].vertices
     }
 
-    /// What the paper's detector finds in marked.gpkg as it is on disk.
+    /// Returns what the paper's detector finds in the file marked.gpkg.
     fn scores(&self) -> Value {
         let mut observed = vec![None; self.reference.len()];
         for (from, to) in coordinates(&reference_path()).into_iter().zip(coordinates(&marked_path())) {
@@ -230,8 +231,8 @@ fn column(basis: &Basis, i: usize) -> Vec<f64> {
     (0..basis.vectors.nrows()).map(|v| basis.vectors[(v, i)]).collect()
 }
 
-/// The spectrum of a ring of 12 vertices, whose eigenvalues 1 − cos(πk/6) occur twice each: there
-/// the basis is not the solver's to choose.
+/// Returns the spectrum of a ring of 12 vertices, whose eigenvalues 1 − cos(πk/6) occur twice each:
+/// the solver may not choose the basis there.
 fn ring() -> Value {
     let mut edges: Vec<[u32; 2]> = (0..11).map(|i| [i, i + 1]).chain([[0, 11]]).collect();
     edges.sort_unstable();
@@ -248,7 +249,7 @@ fn plus_minus(chips: &[f64]) -> String {
     chips.iter().map(|chip| if *chip > 0.0 { '+' } else { '-' }).collect()
 }
 
-/// JSON with one line for every value that is no object, so that a person can read it.
+/// Returns JSON with one line for every value that is not an object, so that a person can read it.
 pub fn to_text(value: &Value) -> String {
     fn write(value: &Value, indent: usize, text: &mut String) {
         let Value::Object(fields) = value else { return text.push_str(&value.to_string()) };
@@ -265,7 +266,7 @@ pub fn to_text(value: &Value) -> String {
     text + "\n"
 }
 
-/// Where two documents differ by more than `tolerance` in a number or in anything else.
+/// Returns the places where two documents differ, in a number by more than `tolerance`.
 pub fn differences(a: &Value, b: &Value, tolerance: f64) -> Vec<String> {
     fn compare(a: &Value, b: &Value, tolerance: f64, at: &str, found: &mut Vec<String>) {
         match (a, b) {

@@ -88,7 +88,7 @@ fn segments(name: &str) -> Vec<String> {
 /// The modules of a crate by their paths; the empty path is the root.
 struct Modules(BTreeMap<Vec<String>, Source>);
 
-/// What a module imports, and the rest of it.
+/// The imports of a module, and the rest of its code.
 struct Source {
     imports: Vec<Import>,
     code: Vec<String>,
@@ -102,7 +102,7 @@ struct Import {
     is_public: bool,
 }
 
-/// By what names a module uses another.
+/// The names by which a module uses another.
 type Edges = BTreeMap<Vec<String>, BTreeMap<Vec<String>, BTreeSet<String>>>;
 
 impl Modules {
@@ -126,7 +126,7 @@ impl Modules {
         Modules(modules)
     }
 
-    /// Groups of modules that reach each other, with the names by which they do.
+    /// Returns groups of modules that reach each other, with the names by which they do.
     fn circles(&self) -> Vec<String> {
         let edges = self.edges();
         let reached: BTreeMap<_, _> = edges.keys().map(|module| (module, reach(&edges, module))).collect();
@@ -164,13 +164,15 @@ impl Modules {
         edges
     }
 
-    /// A module that only hands on a name of its child does not use it.
+    /// Returns whether a module uses an import. A module that only re-exports a name of its child
+    /// does not.
     fn is_used(&self, module: &[String], import: &Import) -> bool {
         let is_childs = self.resolve(module, &import.path).is_some_and(|target| target.starts_with(module));
         !(import.is_public && is_childs) || self.0[module].mentions(&import.name)
     }
 
-    /// The module in which the item of a path is defined; `None` when that is in another crate.
+    /// Returns the module in which the item of a path is defined; `None` when that is in another
+    /// crate.
     fn resolve(&self, module: &[String], path: &[String]) -> Option<Vec<String>> {
         let mut at = module.to_vec();
         for (i, segment) in path.iter().enumerate() {
@@ -256,7 +258,7 @@ impl Source {
     }
 }
 
-/// The imports of a tree like `a::{b, c::{self, d as e}}`.
+/// Adds the imports of a tree like `a::{b, c::{self, d as e}}`.
 fn add_imports(imports: &mut Vec<Import>, prefix: &[String], tree: &[String], is_public: bool) {
     let mut path = prefix.to_vec();
     for (i, token) in tree.iter().enumerate() {
@@ -292,7 +294,7 @@ fn is_word(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphanumeric() || c == '_')
 }
 
-/// The tokens without items that are compiled for tests alone.
+/// Returns the tokens without items that are compiled for tests alone.
 fn without_tests(tokens: Vec<String>) -> Vec<String> {
     const CFG_TEST: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut kept = Vec::new();
@@ -341,7 +343,7 @@ fn tokens(text: &str) -> Vec<String> {
     tokens
 }
 
-/// The length of a comment that may hold others.
+/// Returns the length of a comment that may hold others.
 fn block_comment(text: &str) -> usize {
     let mut depth = 0;
     for (i, pair) in text.as_bytes().windows(2).enumerate() {
@@ -367,7 +369,7 @@ fn string(text: &str) -> usize {
     text.char_indices().skip(1).find(ends).map_or(text.len(), |(i, _)| i + 1)
 }
 
-/// A character, or the mark that begins a lifetime.
+/// Returns the length of a character, or of the mark that begins a lifetime.
 fn character(text: &str) -> usize {
     let mut chars = text.char_indices().skip(1);
     match (chars.next(), chars.next()) {

@@ -1,7 +1,7 @@
-//! A map marked by the driver inside ogr2ogr is attacked, and `meshmark verify` names its
+//! A map that the driver marks inside ogr2ogr is attacked, and `meshmark verify` names its
 //! recipient.
 //!
-//! A few attacks on one map; the whole suite is the command `table2`.
+//! The test makes a few attacks on one map; the command `table2` makes all of them.
 
 use meshmark_host_tests::{
     experiment::{Outcome, Plan, bit_error_percent, is_match, run},
@@ -12,7 +12,7 @@ use std::{path::Path, sync::OnceLock};
 /// Attacks that a mark of the default strength must survive on this map.
 const SURVIVED: [&str; 10] =
     ["4b", "5", "7", "9b", "10-3", "dp0.25", "vertices50", "features50", "geojson", "merge"];
-/// Of these, those that the coded message is put through as well.
+/// The attacks among these that are also made on the coded message.
 const CODED: [&str; 3] = ["5", "9b", "vertices50"];
 const OTHERS: [&str; 4] = ["6", "unmarked", "again", "average2"];
 

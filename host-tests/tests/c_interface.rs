@@ -1,4 +1,4 @@
-//! What a program gets that loads the plugin as a library: `plugin/include/meshmark.h`.
+//! The interface for programs that load the plugin as a library: `plugin/include/meshmark.h`.
 
 use gdal::{
     Dataset, DriverManager, Metadata,
@@ -25,7 +25,8 @@ fn plugin() -> &'static Library {
     PLUGIN.get_or_init(|| unsafe { Library::new(library()).unwrap() })
 }
 
-/// `MeshmarkFilter` with the host's key and more options; the message of the one error on failure.
+/// Calls `MeshmarkFilter` with the host's key and more options. A failure holds the message of the
+/// one error.
 fn filter(host: &Host, source: GDALDatasetH, more: &[&str]) -> Result<Dataset, String> {
     let key = format!("KEY={}", host.path("key.json").display());
     call(source, &[&[key.as_str(), "RECIPIENT=ACME GmbH"], more].concat())
@@ -49,7 +50,7 @@ fn call(source: GDALDatasetH, options: &[&str]) -> Result<Dataset, String> {
     }
 }
 
-/// Runs `f` with GDAL's messages off the terminal and counted from zero.
+/// Runs `f` without GDAL's messages on the terminal, and counts them.
 fn quiet<T>(f: impl FnOnce() -> T) -> T {
     // SAFETY: the handler is popped after it was pushed.
     unsafe {
@@ -69,7 +70,7 @@ fn last_failure() -> Option<String> {
     }
 }
 
-/// A fixture, copied into memory: a dataset without a name or a file.
+/// Copies a fixture into memory: a dataset without a name or a file.
 fn in_memory(fixture_name: &str) -> Dataset {
     let file = Dataset::open(fixture(fixture_name)).unwrap();
     let memory = DriverManager::get_driver_by_name("Memory").unwrap().create_vector_only("").unwrap();
@@ -244,7 +245,7 @@ fn measuring_the_extent_keeps_filters_and_sees_all_features() {
     assert_eq!(layer.features().count(), service, "the filter is still there");
 }
 
-/// A layer with two geometry columns: a square's outline, and its centre as a point.
+/// Returns a layer with two geometry columns: the outline of a square, and its centre as a point.
 fn two_columns() -> Dataset {
     let mut dataset = DriverManager::get_driver_by_name("Memory").unwrap().create_vector_only("").unwrap();
     let srs = gdal::spatial_ref::SpatialRef::from_epsg(3067).unwrap();

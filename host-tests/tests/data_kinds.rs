@@ -1,4 +1,4 @@
-//! Data of every kind: each is marked by reading and by writing and verifies, or is refused with a
+//! Data of every kind: each is marked by reading and by writing and matches, or is refused with a
 //! sentence.
 
 use gdal::{
@@ -18,9 +18,9 @@ struct Map {
     file: &'static str,
     layer: &'static str,
     srs: &'static str,
-    /// Well-known texts; an empty one is a null geometry.
+    /// Well-known texts; an empty one stands for a null geometry.
     features: Vec<String>,
-    /// What the field `名称` of every feature is set to.
+    /// The value of the field `名称` in every feature.
     name: &'static str,
     first_fid: i64,
 }
@@ -62,8 +62,8 @@ impl Map {
     }
 }
 
-/// Marks by reading and by writing, which makes one and the same map, verifies both, and returns
-/// the RMS length of the moves in CRS units.
+/// Marks by reading and by writing, which gives the same map, verifies both, and returns the RMS
+/// length of the moves in CRS units.
 #[track_caller]
 fn marks(map: &Map) -> f64 {
     let host = Host::new();
@@ -80,7 +80,7 @@ fn marks(map: &Map) -> f64 {
     rms
 }
 
-/// Asserts that both sides refuse the map with these words, and write nothing.
+/// Asserts that reading and writing refuse the map with these words, and write nothing.
 #[track_caller]
 fn refuses(map: &Map, words: &str) {
     let host = Host::new();
@@ -97,12 +97,12 @@ fn refuses(map: &Map, words: &str) {
 
 // --- maps ----------------------------------------------------------------------------------------
 
-/// A number in 0..1 that depends on nothing but `i`.
+/// Returns a number in 0..1 that depends on `i` alone.
 fn scattered(i: usize) -> f64 {
     (i as f64 * 0.618_033_988_749_894_9 + (i * i % 97) as f64 * 0.013).fract()
 }
 
-/// The corners of `count` houses along streets, metres east and north of the first.
+/// Returns the corners of `count` houses along streets, metres east and north of the first.
 fn houses(count: usize) -> Vec<[[f64; 2]; 4]> {
     let house = |i: usize| {
         let (x, y) = ((i % 12) as f64 * 40.0, (i / 12) as f64 * 50.0);
@@ -114,22 +114,22 @@ fn houses(count: usize) -> Vec<[[f64; 2]; 4]> {
     (0..count).map(house).collect()
 }
 
-/// Enough for the default patch.
+/// A number of houses that is enough for the default patch.
 const MANY: usize = 240;
 
-type Place<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
+type Projection<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
 
-/// Moves and scales metres to the place of a map.
+/// Returns a map from metres to the CRS of a test map.
 fn at(origin: [f64; 2], scale: [f64; 2]) -> impl Fn([f64; 2]) -> [f64; 2] {
     move |[x, y]| [origin[0] + x * scale[0], origin[1] + y * scale[1]]
 }
 
-/// The same in degrees at a place on the earth.
+/// Returns the map from metres to degrees at a place on the earth.
 fn degrees(lon: f64, lat: f64) -> impl Fn([f64; 2]) -> [f64; 2] {
     at([lon, lat], [1.0 / (111_320.0 * lat.to_radians().cos()), 1.0 / 111_320.0])
 }
 
-fn list(points: &[[f64; 2]], place: Place, more: &str) -> String {
+fn list(points: &[[f64; 2]], place: Projection, more: &str) -> String {
     let text = |&point: &[f64; 2]| {
         let [x, y] = place(point);
         format!("{x:?} {y:?}{more}")
@@ -137,15 +137,16 @@ fn list(points: &[[f64; 2]], place: Place, more: &str) -> String {
     points.iter().map(text).collect::<Vec<_>>().join(",")
 }
 
-/// Houses as polygons.
-fn polygons(place: Place) -> Vec<String> {
+/// Returns houses as polygons.
+fn polygons(place: Projection) -> Vec<String> {
     houses(MANY)
         .iter()
         .map(|[a, b, c, d]| format!("POLYGON (({}))", list(&[*a, *b, *c, *d, *a], place, "")))
         .collect()
 }
 
-/// Each house in this shape, where `{open}` stands for its corners and `{ring}` for those closed.
+/// Returns each house in this shape, where `{open}` stands for its corners and `{ring}` for the
+/// closed ring.
 fn shapes(template: &str, more: &str) -> Vec<String> {
     let place = at([385_000.0, 6_671_000.0], [1.0, 1.0]);
     let shape = |house: &[[f64; 2]; 4]| {
@@ -236,14 +237,15 @@ fn polar_latitudes() {
     marks(&Map::new("EPSG:4326", polygons(&degrees(15.0, 78.2))));
     marks(&Map::new("EPSG:4326", polygons(&degrees(-40.0, 89.9))));
     marks(&Map::new("EPSG:4326", polygons(&degrees(166.7, -77.85))));
-    // This map is around the pole itself.
+    // This map surrounds the pole.
     marks(&Map::new("EPSG:3995", polygons(&at([-300.0, -400.0], [1.0, 1.0]))));
     marks(&Map::new("EPSG:3031", polygons(&at([300_000.0, -1_300_000.0], [1.0, 1.0]))));
 }
 
 #[test]
 fn both_sides_of_the_180th_meridian() {
-    // Half of the map on either side, as formats want it; and east of it in longitudes beyond 180.
+    // Half of the map lies on either side, as formats require, or all of it east of 180°, in
+    // longitudes beyond 180.
     let fiji = degrees(179.998, -16.8);
     let wrapped = |point| {
         let [lon, lat] = fiji(point);
@@ -314,7 +316,7 @@ fn layers_whose_crs_differ_only_in_heights_are_marked_together() {
     assert!(contents::read(&host.path("out.gpkg")) == read);
     host.run("ogr2ogr", &["-t_srs", "EPSG:3857", "moved.gpkg", "read.gpkg"]).succeeds();
     host.matches("map.gpkg", &["--record", "read.json", "moved.gpkg"]);
-    // A CRS without a code that is another one is named in a few words.
+    // Another CRS without a code is named in a few words.
     let more = ["-update", "map.gpkg", &fixture, "amenities", "-t_srs", "EPSG:3857+3900"];
     host.run("ogr2ogr", &more).succeeds();
     let run = host.mark("GPKG", "mixed.gpkg", "map.gpkg", &[]);
@@ -390,7 +392,7 @@ fn a_csv_file_with_two_columns_of_coordinates_is_marked_and_verified_as_the_page
     assert!(!fields.stdout.contains("lon") && !fields.stdout.contains("lat:"), "{}", fields.stdout);
     let meshmark = host.meshmark();
     host.run(meshmark.to_str().unwrap(), &["compare", "points.vrt", "marked.gpkg"]).succeeds();
-    // What leaks is again a table of two columns.
+    // The leaked file is a table of two columns again.
     let leak = ["-f", "CSV", "xy.csv", "marked.gpkg", "-lco", "GEOMETRY=AS_XY"];
     host.run("ogr2ogr", &leak).succeeds();
     let xy = std::fs::read_to_string(host.path("xy.csv")).unwrap();

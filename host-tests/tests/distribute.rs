@@ -1,4 +1,4 @@
-//! `meshmark distribute` against `ogr2ogr` through the driver: the same records, the same maps.
+//! `meshmark distribute` gives the same records and maps as `ogr2ogr` through the driver.
 
 use meshmark_host_tests::{
     contents::{self, FeatureContents},
@@ -10,7 +10,7 @@ use std::fs;
 const RECIPIENTS: [(&str, &str); 2] =
     [("ACME GmbH", "acme-gmbh-f384e512"), ("Öster AB", "öster-ab-5b966f44")];
 
-/// A host with a list of the recipients and a copy of a fixture.
+/// Returns a host with a list of the recipients and a copy of a fixture.
 fn host() -> Host {
     let host = Host::new();
     fs::write(host.path("list.csv"), "recipient\nACME GmbH\nÖster AB\n").unwrap();
@@ -25,14 +25,14 @@ fn distribute(host: &Host, folder: &str, map: &str, more: &[&str], threads: &str
     host.run_with(host.meshmark().to_str().unwrap(), &arguments, &[("GDAL_NUM_THREADS", threads)])
 }
 
-/// What `ogrinfo` says of the layers of a map, without its name.
+/// Returns what `ogrinfo` prints of the layers of a map, without its name.
 fn summary(host: &Host, map: &str) -> String {
     let text = host.run("ogrinfo", &["-al", "-so", map]).succeeds().stdout;
     text.lines().filter(|line| !line.starts_with("INFO: ")).collect::<Vec<_>>().join("\n")
 }
 
-/// Adds what a copy might lose: ids with gaps, fields of all kinds with widths, nulls, a table,
-/// heights.
+/// Adds data that a copy might lose: ids with gaps, fields of all kinds with widths, nulls, a
+/// table, heights.
 fn enrich(host: &Host) {
     let sql = |sql: &str| drop(host.run("ogrinfo", &["-q", "map.gpkg", "-sql", sql]).succeeds());
     sql("UPDATE buildings SET fid = fid + 1000 WHERE fid % 3 = 0");
@@ -65,14 +65,15 @@ fn enrich(host: &Host) {
     host.run("ogr2ogr", &["-update", "-a_srs", "EPSG:3067", "map.gpkg", "heights.geojson"]).succeeds();
 }
 
-/// What an SQL statement answers about a GeoPackage, one value a line.
+/// Returns the result of an SQL statement on a GeoPackage, one value a line.
 fn answer(host: &Host, map: &str, sql: &str) -> String {
     let text = host.run("ogrinfo", &["-q", map, "-sql", sql]).succeeds().stdout;
     text.lines().filter_map(|line| Some(line.split_once(" = ")?.1)).collect::<Vec<_>>().join("\n")
 }
 
-/// Every geometry has the same bytes in both, header and all; the indexes of the first are sound,
-/// hold the features that those of the second hold, and their boxes are no larger.
+/// Asserts that every geometry has the same bytes in both, including its header, and that the
+/// indexes of the first are sound, hold the features of the second's, and have boxes that are no
+/// larger.
 fn bytes_and_indexes_agree(host: &Host, copy: &str, driver: &str) {
     for layer in ["buildings", "roads", "heights", "arcs"] {
         let bytes = format!("SELECT hex(geom) AS h FROM {layer} WHERE geom NOT NULL ORDER BY fid");
@@ -165,8 +166,8 @@ fn one_layer_goes_into_every_format_as_by_the_driver() {
     assert!(!host.path("many").exists());
 }
 
-/// Sorted, and without numbers: FlatGeobuf orders features by place, before the mark here and after
-/// it in the driver.
+/// Returns features sorted and without numbers: FlatGeobuf orders features by place, here before
+/// the mark and in the driver after it.
 fn in_any_order(mut features: Vec<FeatureContents>) -> Vec<FeatureContents> {
     features.iter_mut().for_each(|feature| feature.fid = None);
     features.sort_by(|a, b| a.attributes.cmp(&b.attributes));
@@ -325,7 +326,7 @@ fn a_distribution_that_is_killed_or_has_no_disk_is_finished_by_the_next_run() {
         assert!(seen.contains(&0) && seen.iter().any(|&copies| copies > 0), "{seen:?}");
         for bytes in [4096, 81920] {
             distribution.reset();
-            // The copy of ogr2ogr is larger.
+            // The copy by ogr2ogr is larger.
             assert_eq!(distribution.survives(Fault::FileSize(bytes)), 0);
         }
         for seconds in [0.05, 0.2, 0.5] {

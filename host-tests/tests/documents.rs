@@ -1,5 +1,5 @@
-//! The commands of the documents, as they stand there. Those of docs/verifier.md are run by the
-//! verifier's own tests, those of docs/qgis.md and the Python of docs/driver.md by `make hosts`.
+//! Runs the commands of the documents unchanged. The verifier's own tests run those of
+//! docs/verifier.md; `make hosts` runs those of docs/qgis.md and the Python of docs/driver.md.
 
 use meshmark_host_tests::plugin::{Host, fixture, library};
 use std::{
@@ -9,14 +9,14 @@ use std::{
     process::{Command, Output},
 };
 
-/// The ```sh blocks of a document.
+/// Returns the ```sh blocks of a document.
 fn blocks(document: &str) -> Vec<String> {
     let text = fs::read_to_string(fixture("..").join(document)).unwrap();
     let after = text.split("```sh\n").skip(1);
     after.map(|rest| rest.split("```").next().unwrap_or_default().to_string()).collect()
 }
 
-/// The commands of a block, one each. What builds and finds the programs is this test's own affair.
+/// Returns the commands of a block one by one, without those that build and find the programs.
 fn commands(block: &str) -> Vec<String> {
     let joined = block.replace("\\\n", " ");
     let is_own =
@@ -24,8 +24,8 @@ fn commands(block: &str) -> Vec<String> {
     joined.lines().filter(is_own).map(String::from).collect()
 }
 
-/// Runs a script where a map, a list, the key and the fixtures are; `suspect.gpkg` is what will be
-/// `marked.gpkg`.
+/// Runs a script in a folder with a map, a list, the key and the fixtures; `suspect.gpkg` becomes a
+/// link to `marked.gpkg`.
 fn run(script: &str) -> Output {
     let host = Host::new();
     if script.contains("keygen key.json") {
@@ -72,7 +72,7 @@ fn the_commands_of_the_page_about_many_recipients_work() {
     blocks.iter().for_each(|block| assert_works("docs/distribute.md", &commands(block).join("\n")));
 }
 
-/// The documents people read, as paths from the root.
+/// Returns the documents, as paths from the root.
 fn documents() -> Vec<String> {
     let folders = ["", "docs/", "examples/", "fixtures/", "fixtures/vectors/"];
     let pages = folders.iter().flat_map(|folder| {
@@ -83,7 +83,7 @@ fn documents() -> Vec<String> {
     pages.collect()
 }
 
-/// What a link to a heading calls it.
+/// Returns the anchors of the headings.
 fn anchors(text: &str) -> Vec<String> {
     let headings = text.lines().filter_map(|line| line.strip_prefix('#'));
     let slug = |heading: &str| -> String {

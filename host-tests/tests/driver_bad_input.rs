@@ -1,4 +1,4 @@
-//! What a user gets who asks for the impossible: one clear sentence, and nothing written or lost.
+//! Impossible requests: the user gets one clear sentence, and nothing is written or lost.
 
 use meshmark_host_tests::plugin::{Host, fixture};
 use std::{
@@ -14,7 +14,8 @@ fn map() -> String {
     fixture("helsinki.gpkg").display().to_string()
 }
 
-/// Runs ogr2ogr, which must say exactly one failure that holds all of `words`, and write nothing.
+/// Runs ogr2ogr, which must report exactly one failure that holds all of `words`, and write
+/// nothing.
 #[track_caller]
 fn refuses(host: &Host, source: &str, options: &[&str], words: &[&str]) {
     let before = host.files();
@@ -30,7 +31,7 @@ fn refuses(host: &Host, source: &str, options: &[&str], words: &[&str]) {
     assert!(host.files() == before, "nothing is written, changed or left");
 }
 
-/// The same with the key and a recipient.
+/// Runs ogr2ogr like [`refuses`], with the key and a recipient.
 #[track_caller]
 fn refuses_map(host: &Host, source: &str, more: &[&str], words: &[&str]) {
     refuses(host, source, &[&KEY[..], &RECIPIENT, more].concat(), words);
@@ -159,7 +160,7 @@ fn a_message_that_is_too_long_for_the_patches_is_told_what_fits() {
     let words =
         ["128 bits with CHIP_RATE=8", "use CHIP_RATE=4 or less, a shorter message, or a larger PATCH_SIZE"];
     refuses_map(&host, &map(), &["-oo", "CODE=REPETITION", "-oo", "CHIP_RATE=8"], &words);
-    // What is advised for small patches is taken.
+    // The advice for small patches works.
     let words = [
         "CODE=LDPC and CHIP_RATE=1 needs 256",
         "use CODE=REPETITION and CHIP_RATE=1, or a larger PATCH_SIZE",
@@ -177,7 +178,7 @@ fn a_message_that_is_too_long_for_the_patches_is_told_what_fits() {
     refuses_map(&host, &host.path("few.geojson").display().to_string(), &options, &words);
 }
 
-/// A GeoJSON map of points, in metres.
+/// Writes a GeoJSON map of points, in metres.
 fn write_points(host: &Host, name: &str, points: impl Iterator<Item = String>) {
     let feature = |p: String| {
         format!(r#"{{"type":"Feature","properties":{{}},"geometry":{{"type":"Point","coordinates":[{p}]}}}}"#)
@@ -202,8 +203,8 @@ fn a_coordinate_that_is_no_number_is_found_by_layer_and_feature() {
     let host = Host::new();
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         host.run("ogr2ogr", &["-f", "ESRI Shapefile", "roads.shp", &map(), "roads"]).succeeds();
-        // The second point of the first line: after the file's header, the record's, box, counts,
-        // one part.
+        // This is the offset of the second point in the first line: after the headers of file and
+        // record, the box, the counts and one part.
         let y = 100 + 8 + 4 + 32 + 8 + 4 + 16 + 8;
         let mut bytes = fs::read(host.path("roads.shp")).unwrap();
         bytes[y..y + 8].copy_from_slice(&bad.to_le_bytes());
@@ -390,7 +391,7 @@ fn a_record_can_be_read_by_whom_the_umask_lets() {
 
 // --- writing onto the source ---------------------------------------------------------------------
 
-/// Writes a map in a format, lets ogr2ogr write the marked map onto it, and returns what it said.
+/// Writes a map in a format, lets ogr2ogr write the marked map onto it, and returns the message.
 fn write_onto_source(host: &Host, format: &str, name: &str, mode: &[&str], target: &str) -> String {
     host.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]).succeeds();
     let run = host.mark(format, target, name, mode);
@@ -417,7 +418,8 @@ fn the_source_survives_being_named_as_the_output() {
     }
 }
 
-/// GeoPackages hold the time they were written, so equal length must do for the bytes of files.
+/// Asserts that the files are the same. GeoPackages hold the time of their writing, so the length
+/// of files is compared instead of their bytes.
 fn assert_same_files(a: &Host, b: &Host, what: &str) {
     let names =
         |host: &Host| host.files().into_iter().map(|(name, bytes)| (name, bytes.len())).collect::<Vec<_>>();
@@ -466,7 +468,7 @@ fn a_writer_that_truncates_the_source_all_the_same_leaves_a_saved_copy() {
         let host = Host::new();
         host.run("ogr2ogr", &["-f", format, name, &map(), "buildings"]);
         let original = fs::read(host.path(name)).unwrap();
-        // The driver reads the command line of ogr2ogr alone; this is any other program that
+        // The driver reads the command line of ogr2ogr alone; this is another program that
         // writes.
         fs::copy(in_path("ogr2ogr"), host.path("export")).unwrap();
         let source = format!("MESHMARK:{name}");

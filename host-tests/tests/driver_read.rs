@@ -1,4 +1,4 @@
-//! What a user gets who reads MESHMARK: with GDAL's own programs.
+//! The results of reading MESHMARK with GDAL's own programs.
 
 use gdal::Dataset;
 use meshmark_core::{
@@ -22,7 +22,7 @@ fn survey_of(path: &Path) -> Survey {
     survey(&Dataset::open(path).unwrap(), &Selection::default()).unwrap()
 }
 
-/// `ogrinfo` of a map through MESHMARK.
+/// Runs `ogrinfo` on a map through MESHMARK.
 fn ogrinfo(host: &Host, source: &str, more: &[&str]) -> Run {
     let source = format!("MESHMARK:{source}");
     let mut arguments = vec![source.as_str(), "-oo", "KEY=key.json", "-oo", "RECIPIENT=ACME GmbH"];
@@ -280,7 +280,7 @@ fn other_formats_are_marked_as_well() {
     }
 }
 
-/// Moves between maps whose feature ids, names and attribute types differ by format.
+/// Returns moves between maps whose feature ids, names and attribute types differ by format.
 fn without_ids(before: &[LayerContents], after: &[LayerContents]) -> Vec<([f64; 2], [f64; 2])> {
     let strip = |layers: &[LayerContents]| {
         let mut layers = layers.to_vec();
@@ -351,12 +351,12 @@ fn a_spatial_filter_reads_what_it_reads_of_the_marked_map() {
             let spat = [&["-spat"], &rectangle[..]].concat();
             let (view, file) = (format!("view{number}_{name}"), format!("file{number}_{name}"));
             let of_view = host.mark("GPKG", &view, &source(name), &spat);
-            // By Arrow, GDAL 3.10 reads all of a table without geometry, and nothing of it
+            // Through Arrow, GDAL 3.10 reads a whole table without geometry, and nothing of it
             // otherwise.
             let arguments = [&["-f", "GPKG", &file, &marked], &spat[..]].concat();
             let of_file = host.run_with("ogr2ogr", &arguments, &[("OGR2OGR_USE_ARROW_API", "NO")]);
             assert_eq!((of_view.code, of_file.code), (Some(0), Some(0)), "{}", of_view.stderr);
-            // GDAL 3.12 has one about a table without geometry.
+            // GDAL 3.12 warns of a table without geometry.
             assert_eq!(of_view.errors(), of_file.errors());
             let (view, file) = (contents::read(&host.path(&view)), contents::read(&host.path(&file)));
             assert!(view.iter().any(|layer| !layer.features.is_empty()), "{name}: the test finds something");
@@ -397,7 +397,7 @@ fn attribute_filters_work_and_those_on_geometry_see_the_marked_one() {
     assert_eq!(exact(&wkt(unmarked.features[7].geometries[0].as_ref().unwrap())), 0);
     let native =
         ogrinfo(&host, &source("helsinki.gpkg"), &["-so", "amenities", "-where", "ST_MinX(geom) > 0"]);
-    // The exit code of ogrinfo is 0 all the same in GDAL 3.12.
+    // The exit code of ogrinfo is 0 nevertheless in GDAL 3.12.
     let refused = native.stderr.contains("depends on geometry") && !native.stdout.contains("Feature Count");
     assert!(refused, "SQL of the source's own on its unmarked geometry is refused: {}", native.stderr);
 }

@@ -1,4 +1,4 @@
-//! Marking as the last step: what a user gets who writes to MESHMARK with ogr2ogr.
+//! Marking as the last step: the results of writing to MESHMARK with `ogr2ogr`.
 
 use meshmark_core::record::Record;
 use meshmark_host_tests::{
@@ -92,7 +92,8 @@ fn every_format_gets_what_its_own_driver_writes_but_for_the_coordinates() {
     }
 }
 
-/// A map without what differs by file name; FlatGeobuf orders features by place.
+/// Returns a map without the names that follow from that of the file; FlatGeobuf orders features by
+/// place.
 fn comparable(host: &Host, name: &str) -> Vec<LayerContents> {
     let mut layers = contents::read(&host.path(name));
     for layer in &mut layers {
@@ -232,10 +233,10 @@ fn the_key_may_come_from_the_configuration_and_the_secret_is_seen_nowhere() {
     }
 }
 
-// --- targets that are there ----------------------------------------------------------------------
+// --- targets that exist --------------------------------------------------------------------------
 
-/// Runs ogr2ogr, which must fail with a sentence that holds all of `words` and leave everything as
-/// it was.
+/// Runs ogr2ogr, which must fail with a sentence that holds all of `words` and leave everything
+/// unchanged.
 #[track_caller]
 fn refuses(host: &Host, run: impl FnOnce() -> Run, words: &[&str]) {
     let before = host.files();

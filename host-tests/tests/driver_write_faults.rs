@@ -1,5 +1,5 @@
-//! Whatever goes wrong while a marked map is written: afterwards there is the complete verified
-//! output or what was there before, and exit code 0 only in the first case.
+//! Whatever fails while a marked map is written: afterwards there is the complete verified output
+//! or the previous state, and the exit code is 0 in the first case only.
 
 use gdal_sys::{CPLErr, GDALDatasetH, OGRErr, OGRFieldType, OGRLayerH, OGRwkbGeometryType};
 use libloading::Library;
@@ -21,8 +21,8 @@ fn source(name: &str) -> String {
     fixture(name).display().to_string()
 }
 
-/// Asserts that ogr2ogr fails with a sentence that holds `words`, and that nothing is written or
-/// left.
+/// Asserts that ogr2ogr fails with a sentence that holds `words`, and that it writes and leaves
+/// nothing.
 #[track_caller]
 fn fails(host: &Host, target: &str, source: &str, more: &[&str], words: &[&str]) {
     let before = host.files();
@@ -36,7 +36,7 @@ fn fails(host: &Host, target: &str, source: &str, more: &[&str], words: &[&str])
 
 // --- the process or the disk fails ---------------------------------------------------------------
 
-/// Calls to fail at: all near the end, where files are published, and some before.
+/// Returns the calls to fail: all near the end, where files are published, and some before.
 fn places(calls: usize, some: usize) -> Vec<usize> {
     let publication = calls.saturating_sub(25)..=calls;
     (1..=some).map(|i| i * (calls - 25) / (some + 1)).chain(publication).collect()
@@ -128,7 +128,7 @@ fn a_feature_that_the_format_refuses_stops_everything() {
 #[test]
 fn a_feature_that_fails_is_never_skipped() {
     let host = Host::new();
-    // Two layers into one, with the same ids: every feature of the second fails.
+    // Two layers go into one, with the same ids, so every feature of the second fails.
     let more = ["buildings", "landuse", "-nln", "both", "-nlt", "GEOMETRY", "-preserve_fid"];
     for option in [&["-skipfailures"][..], &["-gt", "1"], &["-gt", "7"]] {
         let more = [&more[..], option].concat();
@@ -147,7 +147,7 @@ fn transactions_of_any_size_make_the_same_map() {
         map
     };
     let mut seen = Vec::new();
-    // Without transactions ogr2ogr of GDAL 3.6 commits all the same, which fails as with any
+    // Without transactions, ogr2ogr of GDAL 3.6 commits nevertheless, which fails as with any
     // database.
     let before = host.files();
     let without = host.create("out.gpkg", &source("kotka.gpkg"), &["-gt", "0"]);
@@ -179,7 +179,7 @@ fn a_source_that_ends_early_makes_no_map() {
     }
 }
 
-// --- the bare path: what GDAL does not let a driver prevent --------------------------------------
+// --- the bare path, which GDAL does not let a driver refuse --------------------------------------
 
 #[test]
 fn without_the_prefix_nothing_marked_is_written_and_a_new_file_is_refused() {
@@ -216,7 +216,7 @@ fn without_the_prefix_gdal_deletes_a_file_that_is_there_or_extends_it_unmarked()
 
 // --- hosts that use the library ------------------------------------------------------------------
 
-/// A host in this process. GDAL's last error is one per thread, its drivers are one per process.
+/// A host in this process. GDAL has one last error per thread, and one set of drivers per process.
 struct InProcess {
     host: Host,
     _alone: MutexGuard<'static, ()>,
@@ -271,7 +271,7 @@ impl InProcess {
         Open { dataset, _host: self }
     }
 
-    /// Asserts that there is nothing but what was there before.
+    /// Asserts that the files are those from before.
     #[track_caller]
     fn wrote_nothing(&self, words: &str) {
         let failure = last_failure().expect("a failure, and no other message after it");
@@ -328,7 +328,7 @@ impl Open<'_> {
         }
     }
 
-    /// Writes 200 points; the id of the first, and its successors', where one is given.
+    /// Writes 200 points, with ids from the given one on.
     fn points(&self, layer: OGRLayerH, first_id: Option<i64>) -> OGRErr::Type {
         let mut result = OGRErr::OGRERR_NONE;
         for i in 0..200 {

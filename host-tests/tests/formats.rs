@@ -1,5 +1,4 @@
-//! Every format there is a use for, end to end: marked by GDAL's own programs, read by
-//! `meshmark verify`.
+//! Every useful format, end to end: marked by GDAL's own programs, read by `meshmark verify`.
 
 use meshmark_host_tests::plugin::{Host, fixture};
 use std::fs;
@@ -8,7 +7,7 @@ fn kotka() -> String {
     fixture("kotka.gpkg").display().to_string()
 }
 
-/// A layer without attributes, for formats with a fixed set of them.
+/// The selection of a layer without attributes, for formats with a fixed set of them.
 const BARE: [&str; 2] = ["-sql", "SELECT geom FROM buildings"];
 const LAYER: [&str; 1] = ["buildings"];
 
@@ -17,9 +16,9 @@ const LAYER: [&str; 1] = ["buildings"];
 /// A map in one format, made from a GeoPackage, marked by reading into the same format.
 struct Read {
     format: &'static str,
-    /// The file name's ending.
+    /// The ending of the file name.
     ending: &'static str,
-    /// What is taken from the GeoPackage.
+    /// The selection from the GeoPackage.
     source: &'static [&'static str],
     /// Options for making such a file.
     options: &'static [&'static str],
@@ -30,11 +29,11 @@ struct Read {
 /// LIBKML writes no invalid polygon.
 const LINES: [&str; 2] = ["-nlt", "MULTILINESTRING"];
 const PLAIN: Read = Read { format: "", ending: "", source: &LAYER, options: &[], open: &[] };
-/// These formats do not say which CRS they are in.
+/// These formats do not name their CRS.
 const CRS: [&str; 2] = ["-oo", "SRS=EPSG:3067"];
 
-/// From GDAL 3.11 on the column is named after the source's, and only one named `WKT` is read
-/// again.
+/// From GDAL 3.11 on, the column is named after that of the source, and only one named `WKT` is
+/// read again.
 const AS_WKT: [&str; 4] = ["-lco", "GEOMETRY=AS_WKT", "-lco", "GEOMETRY_NAME=WKT"];
 
 const READ: &[Read] = &[
@@ -67,7 +66,7 @@ fn a_map_in_any_format_is_marked_by_reading_and_verifies_in_the_same_format() {
         let from = kotka();
         let make = [&["-f", format, &map, &from][..], source, options].concat();
         host.run("ogr2ogr", &make).succeeds();
-        // What the format adds of its own cannot always be written again.
+        // Attributes that the format adds cannot always be written again.
         let again = [&["-oo", "RECORD=record.json"][..], options, open].concat();
         let run = host.mark(format, &marked, &map, &again);
         assert_eq!(run.code, Some(0), "{marked}: {}", run.stderr);
@@ -85,7 +84,7 @@ fn a_zipped_shapefile_is_read_where_it_is() {
     host.matches("/vsizip/map.zip", &["--record", "record.json", "marked.gpkg"]);
 }
 
-/// The places of a map as texts of its attributes would undo the mark.
+/// Places of a map in its attributes would undo the mark.
 #[test]
 fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
     let host = Host::new();
@@ -96,7 +95,7 @@ fn a_csv_file_leaves_no_unmarked_coordinates_among_the_attributes() {
     let layer = host.run("ogrinfo", &["-so", "marked.gpkg", "map"]).succeeds().stdout;
     assert!(layer.contains("osm_id: String") && !layer.contains("WKT: String"), "{layer}");
 
-    // A host that opens the file by itself gets them, and hands them on.
+    // A host that opens the file itself reads them, and passes them on.
     let (plain, typed) = (&AS_WKT[..], &[&AS_WKT[..], &["-lco", "CREATE_CSVT=YES"][..]].concat());
     for (attribute, written, open) in [
         ("WKT", plain, &[][..]),
@@ -182,7 +181,7 @@ fn other_formats_are_refused_with_a_way_to_them() {
     }
 }
 
-/// The remedy of the refusal.
+/// Tests the remedy of the refusal.
 #[test]
 fn a_marked_map_that_is_converted_carries_the_message() {
     let host = Host::new();
@@ -201,8 +200,8 @@ fn a_marked_map_that_is_converted_carries_the_message() {
     }
 }
 
-/// A grid of houses, some of whose marked longitudes lie just beside a round number: there GDAL
-/// ends numbers early.
+/// Returns a grid of houses, some of whose marked longitudes lie just beside a round number, where
+/// GDAL ends numbers early.
 fn houses_on_a_round_meridian() -> String {
     let house = |number: u32| {
         let jitter = |n: u32| f64::from(number * 7919 % 101 + n * 13) * 1e-7;
@@ -264,8 +263,8 @@ fn too_few_digits_for_the_message_are_refused_by_their_name() {
     }
 }
 
-/// A copy of kotka's buildings in which so many features have a null geometry and one has an empty
-/// one.
+/// Writes a copy of kotka's buildings in which some features have a null geometry and one has an
+/// empty one.
 fn with_null_and_empty(host: &Host) {
     host.run("ogr2ogr", &["map.gpkg", &kotka(), "buildings"]).succeeds();
     let null = "INSERT INTO buildings (geom) VALUES (NULL), (NULL), (ST_GeomFromText('POLYGON EMPTY'))";

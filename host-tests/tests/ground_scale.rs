@@ -1,5 +1,5 @@
-//! Metres are on the ground where the vertex is: the scale of a projected CRS differs over a large
-//! map.
+//! Metres are measured on the ground at the vertex: the scale of a projected CRS varies over a
+//! large map.
 
 use meshmark_host_tests::plugin::Host;
 use serde_json::{Value, json};
@@ -15,7 +15,7 @@ fn write_line(host: &Host, name: &str, places: &[[f64; 2]]) {
     fs::write(host.path(name), text).unwrap();
 }
 
-/// Helsinki in EPSG:3857, and a point at this place in degrees.
+/// Returns a host with Helsinki in EPSG:3857, and a point at this place in degrees.
 fn town_and_point(longitude: f64, latitude: f64) -> Host {
     let host = Host::new();
     host.copy("helsinki.gpkg", "town.gpkg");
@@ -53,7 +53,7 @@ fn a_map_with_a_point_near_the_pole_is_refused_and_the_point_is_named() {
     assert!(run.code != Some(0) && run.stderr.contains("the scale of EPSG:3857 differs"), "{}", run.stderr);
     fs::remove_file(host.path("list.csv")).unwrap();
     assert!(host.files() == before, "nothing is written");
-    // A mark of an earlier version may be in such a map.
+    // Such a map may carry a mark of an earlier version.
     let (run, report) = host.verify("map.gpkg", &["--recipient", "ACME GmbH", "map.gpkg"]);
     assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")), "{}", run.stderr);
 }
@@ -79,7 +79,7 @@ fn a_map_over_which_the_scale_differs_little_is_measured_where_the_vertex_is() {
     let run = host.run(command.to_str().unwrap(), &["compare", "--json", "map.gpkg", "marked.gpkg"]);
     let compared: Value = serde_json::from_str(&run.succeeds().stdout).unwrap();
     assert_eq!(record["displacement"], compared["displacement"]);
-    // In metres of its own CRS the town moved as far.
+    // In metres of its own CRS the town moves equally far.
     for file in ["map", "marked"] {
         let (from, to) = (format!("{file}.gpkg"), format!("{file}-3067.gpkg"));
         host.run("ogr2ogr", &[&to, &from, "-t_srs", "EPSG:3067"]).succeeds();
@@ -102,7 +102,7 @@ fn a_comparison_measures_every_vertex_where_it_is() {
     let run = host.run(command.to_str().unwrap(), &["compare", "--json", "before.geojson", "after.geojson"]);
     let compared: Value = serde_json::from_str(&run.succeeds().stdout).unwrap();
     let moved = |figure: &str| compared["displacement"][figure].as_f64().unwrap();
-    // A unit is a metre at the equator, and at 60° half of one on a sphere and 0.5013 m on the
+    // A unit is 1 m at the equator; at 60° it is half a metre on a sphere and 0.5013 m on the
     // ellipsoid.
     assert!((moved("max_m") - 1.0).abs() < 1e-3, "{compared}");
     let rms_m = ((1.0 + 0.5013f64.powi(2)) / 2.0).sqrt();

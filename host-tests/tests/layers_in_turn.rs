@@ -1,5 +1,5 @@
-//! OpenStreetMap files, of which GDAL's driver hands out the features of all layers in turn: as
-//! many come out as by plain `ogr2ogr`.
+//! OpenStreetMap files, of which GDAL's driver returns the features of all layers in turn: no
+//! feature is lost in comparison with plain `ogr2ogr`.
 
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_host_tests::plugin::Host;
@@ -14,8 +14,8 @@ use std::{
 const INTERLEAVED: [[(&str, &str); 1]; 2] =
     [[("OGR_INTERLEAVED_READING", "NO")], [("OGR_INTERLEAVED_READING", "YES")]];
 
-/// A street through `shops` shops, with a house for every fifth, a lake for every fiftieth, routes
-/// and sites: features in each of the five layers.
+/// Writes a street through `shops` shops, with a house for every fifth, a lake for every fiftieth,
+/// routes and sites: features in each of the five layers.
 fn write_osm(host: &Host, name: &str, shops: usize) {
     let mut text = String::from("<osm version=\"0.6\">\n");
     for i in 1..=shops {
@@ -54,7 +54,7 @@ fn write_osm(host: &Host, name: &str, shops: usize) {
     fs::write(host.path(name), text + "</osm>\n").unwrap();
 }
 
-/// How many features each layer of a file has.
+/// Returns the number of features in each layer of a file.
 fn counts(host: &Host, name: &str) -> BTreeMap<String, u64> {
     let dataset = Dataset::open(host.path(name)).unwrap();
     dataset.layers().map(|layer| (layer.name(), layer.feature_count())).collect()
@@ -74,7 +74,7 @@ fn all_features_of_a_small_file_come_out_whatever_the_configuration() {
         host.run_with("ogr2ogr", &arguments, configuration).succeeds();
         assert_eq!(counts(&host, &marked), plain);
         let record = format!("record{number}.json");
-        // The reference is read whole, too.
+        // The reference is also read completely.
         let report = host.matches("map.osm", &["--record", &record, &marked]);
         assert_eq!(report["vertices"]["reference"], 2000);
     }
@@ -83,7 +83,7 @@ fn all_features_of_a_small_file_come_out_whatever_the_configuration() {
 #[test]
 fn layers_of_a_large_file_are_not_given_up() {
     let host = Host::new();
-    // GDAL keeps 100 000 features of layers that nobody reads yet.
+    // GDAL keeps 100 000 features of layers that are not read yet.
     write_osm(&host, "map.osm", 101_000);
     host.run("ogr2ogr", &["-f", "GPKG", "plain.gpkg", "map.osm"]).succeeds();
     host.mark("GPKG", "marked.gpkg", "map.osm", &["-oo", "RECORD=record.json"]).succeeds();
@@ -125,8 +125,8 @@ fn distribute_hands_out_all_features() {
     assert_eq!(counts(&host, copy.to_str().unwrap()), counts(&host, "plain.gpkg"));
 }
 
-/// A pipe that nobody empties holds the reader up, so that the file changes before the map is
-/// through.
+/// A pipe that is not emptied delays the reader, so that the file changes before the end of
+/// the map.
 #[test]
 fn a_file_that_changes_while_it_is_read_ends_ogr2ogr_with_a_failure() {
     let host = Host::new();

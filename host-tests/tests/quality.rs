@@ -1,11 +1,11 @@
-//! Marking through the driver keeps real maps as good as they were, and the message is read from
+//! Marking through the driver preserves the quality of real maps, and the message is read from
 //! every kind of mark.
 
 use meshmark_core::options::{Laplacian, Rigidity};
 use meshmark_host_tests::plugin::{Host, library};
 use serde_json::Value;
 
-/// What the command prints as JSON.
+/// Returns the JSON output of the command.
 fn meshmark(host: &Host, arguments: &[&str]) -> Value {
     let run = host.run(library().with_file_name("meshmark").to_str().unwrap(), arguments).succeeds();
     serde_json::from_str(&run.stdout).unwrap()

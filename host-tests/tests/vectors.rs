@@ -1,11 +1,12 @@
-//! Today's code makes the test vectors of fixtures/vectors again.
+//! The current code reproduces the test vectors of fixtures/vectors.
 
 use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_host_tests::vectors::{self, ReferenceMarking, differences};
 use serde_json::{Value, json};
 use std::{fs, sync::LazyLock};
 
-/// Another processor rounds otherwise; nothing else may differ. Metres, and what has no unit.
+/// The tolerance for numbers in metres and without a unit: processors round differently, and
+/// nothing else may differ.
 const TOLERANCE: f64 = 1e-9;
 
 static MARKING: LazyLock<ReferenceMarking> = LazyLock::new(ReferenceMarking::new);

@@ -1,4 +1,5 @@
-//! Mark with `ogr2ogr`, do to the file what people do, verify with `meshmark verify`.
+//! Maps are marked with `ogr2ogr`, changed as users change them, and verified with `meshmark
+//! verify`.
 
 use gdal::spatial_ref::SpatialRef;
 use geo::CoordsIter;
@@ -9,7 +10,7 @@ use meshmark_host_tests::{
 };
 use serde_json::{Value, json};
 
-/// A host with a map and the copy of it that ACME GmbH got.
+/// Returns a host with a map and its copy for ACME GmbH.
 fn marked(fixture: &str, options: &[&str]) -> Host {
     let host = Host::new();
     host.copy(fixture, "map.gpkg");
@@ -29,15 +30,15 @@ fn the_message_is_read_without_a_record() {
     let report = host.matches("map.gpkg", &[&how[..], &["--message", &message, "marked.gpkg"]].concat());
     assert_eq!(report["message"], message.as_str());
 
-    // Nothing is expected: the message is decoded all the same, and nobody is accused.
+    // Without an expected message, the message is decoded nevertheless, and nobody is accused.
     let (run, report) = host.verify("map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
     assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
     assert_eq!(report["message"], message.as_str());
     assert!(report["bit_errors"].is_null() && report["p_value_log10"].is_null());
 }
 
-/// A copy as it was before messages were whitened: its message is what the key whitens to these
-/// bits, and its record has no field for it.
+/// Makes a copy as before the introduction of whitening: the key whitens its message to these bits,
+/// and its record has no field for whitening.
 fn mark_unwhitened(host: &Host, bits: &str, name: &str) {
     let message = host.key().unwhitened(&Message::from_hex(bits).unwrap()).to_hex();
     let (copy, path) = (format!("{name}.gpkg"), format!("{name}.json"));
@@ -90,7 +91,7 @@ fn a_serial_number_names_its_own_copy_alone() {
             let list = report["candidates"]["list"].as_array().unwrap();
             assert_eq!(list[0]["record"], "1.json");
             assert!(p(&list[0]) < -6.0 && list[1..].iter().all(|entry| p(entry) > -3.0), "{list:?}");
-            // Without a record the message may be of either kind.
+            // Without a record, the message may be of either kind.
             let own = host.matches("map.gpkg", &["--message", &format!("{:0digits$x}", 1), suspect]);
             assert_eq!(own["null_hypothesis"], null);
             let (run, _) = of(&["--message", &format!("{:0digits$x}", 2)]);
@@ -99,7 +100,7 @@ fn a_serial_number_names_its_own_copy_alone() {
     }
 }
 
-/// The code and the chip rate of a report or a record.
+/// Returns the code and the chip rate of a report or a record.
 fn code_of(document: &Value) -> (&str, u64) {
     (document["code"].as_str().unwrap(), document["chip_rate"].as_u64().unwrap())
 }
@@ -120,7 +121,7 @@ fn a_recipient_is_coded_by_default_and_read_with_a_record_and_without() {
         assert_eq!(report["code"]["decoder"], "belief-propagation");
         assert_eq!(report["bits"].as_array().unwrap().len(), 128);
     }
-    // Under another code the mark of the key shows, and its bits make no whole message.
+    // Under another code the mark of the key shows, but its bits make no whole message.
     let repeated = ["--code", "repetition", "--recipient", "ACME GmbH", "marked.gpkg"];
     let (run, report) = host.verify("map.gpkg", &repeated);
     assert_eq!((run.code, &report["verdict"]), (Some(3), &Value::from("inconclusive")));
@@ -167,7 +168,7 @@ fn a_person_reads_how_the_message_was_decoded() {
     assert!(text.contains("(0 of 128 bits differ from the expected message)\ncode:         "), "{text}");
     assert!(text.contains(&format!("code:         {decoded}\n")), "{text}");
     assert!(text.contains(&format!("How it was decoded: {decoded}.\n")), "{text}");
-    // Where there is no mark, there was nothing to decode.
+    // Without a mark, there is nothing to decode.
     let text = text_of("map.gpkg");
     assert!(text.contains("NO MATCH") && !text.contains("code bits"), "{text}");
 }
@@ -253,7 +254,7 @@ fn a_suspect_in_another_crs_is_reprojected() {
     }
 }
 
-/// The marked map's coordinates in an EPSG CRS, perhaps y before x, under a label of another CRS or
+/// Writes the marked map in an EPSG CRS, perhaps with y before x, and labels it with another CRS or
 /// none.
 fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
     let mut map = reproject::reproject(&Map::read(&host.path("marked.gpkg")).unwrap(), epsg, None).unwrap();
@@ -266,8 +267,8 @@ fn mislabelled(host: &Host, epsg: u32, swapped: bool, label: Option<u32>) {
     map.write(&host.path("suspect.gpkg")).unwrap();
 }
 
-/// Returns the report's entry for these coordinates. EPSG:3067, the reference's own, is UTM zone 35
-/// by another name.
+/// Returns the entry of the report for these coordinates. EPSG:3067, the CRS of the reference, is
+/// UTM zone 35 by another name.
 fn read_as(epsg: u32, swapped: bool) -> Value {
     let epsg = if epsg == 32635 { 3067 } else { epsg };
     json!({ "crs": format!("EPSG:{epsg}"), "axes_swapped": swapped })
@@ -276,7 +277,7 @@ fn read_as(epsg: u32, swapped: bool) -> Value {
 #[test]
 fn a_missing_crs_is_found_among_the_likely_ones() {
     let host = marked("kotka.gpkg", &[]);
-    // Degrees, web maps, UTM, Finland's older grid, its GK27 grid.
+    // These are degrees, web maps, UTM, and Finland's older grid and GK27 grid.
     for epsg in [4326, 3857, 32635, 2393, 3881] {
         for swapped in [false, true] {
             mislabelled(&host, epsg, swapped, None);

@@ -1,5 +1,9 @@
 use meshmark_dataset::decimals::Digits;
-use std::io::{self, ErrorKind};
+use meshmark_dataset::wkb::WkbError;
+use std::{
+    io::{self, ErrorKind},
+    path::PathBuf,
+};
 
 /// The reasons why a map cannot be marked. Every message names the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -38,8 +42,8 @@ pub enum Error {
          that"
     )]
     OtherCount { layer: String, marked: u64, came: u64 },
-    #[error("layer \"{layer}\", feature {fid}: {reason}")]
-    Geometry { layer: String, fid: i64, reason: String },
+    #[error("layer \"{layer}\", feature {fid}: {source}")]
+    Geometry { layer: String, fid: i64, source: WkbError },
     #[error("the output {path} is the source itself: write the marked map to another place")]
     OutputIsSource { path: String },
     #[error("{0} is not UTF-8, so two names could become one: write it in UTF-8")]
@@ -68,11 +72,11 @@ pub enum Error {
     #[error("RECORD={path} is there already and has other content: move it away, or give another name")]
     RecordDiffers { path: String },
     #[error(
-        "RECORD={path} cannot be written ({reason}): give a file in a folder that exists and can be written"
+        "RECORD={path} cannot be written ({source}): give a file in a folder that exists and can be written"
     )]
-    RecordUnwritable { path: String, reason: String },
+    RecordUnwritable { path: String, source: RecordFault },
     #[error("no threads can be started ({0}): set GDAL_NUM_THREADS=1")]
-    Threads(String),
+    Threads(io::Error),
     #[error(
         "it is no name to write to: write MESHMARK: and then the name of a file, for example MESHMARK:{0}"
     )]
@@ -104,6 +108,19 @@ pub enum Error {
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]
     Core(#[from] meshmark_core::Error),
+}
+
+/// The reason why a record cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordFault {
+    #[error("{} is no folder", .0.display())]
+    NoFolder(PathBuf),
+    #[error("it is a folder")]
+    IsFolder,
+    #[error("it is a link to a file that does not exist")]
+    DanglingLink,
+    #[error(transparent)]
+    Io(#[from] io::Error),
 }
 
 pub type Result<T> = std::result::Result<T, Error>;

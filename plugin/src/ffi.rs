@@ -141,7 +141,7 @@ unsafe extern "C" fn meshmark_move(
         let layer = unsafe { text(layer) };
         let error = match error {
             NotMoved::UnknownVertex([x, y]) => Error::UnknownVertex { layer, fid, x, y },
-            NotMoved::Wkb(reason) => Error::Geometry { layer, fid, reason: reason.to_string() },
+            NotMoved::Wkb(source) => Error::Geometry { layer, fid, source },
         };
         fail(&marking.name, &error);
         -1

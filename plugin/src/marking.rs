@@ -14,7 +14,7 @@ use meshmark_core::{
     patches::Patches,
 };
 use meshmark_dataset::{
-    LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, ThreadPool,
+    LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool,
     decimals::Digits,
     marking::{self, Moves, Unmarked},
     same_file, survey,
@@ -88,7 +88,7 @@ impl MarkingRequest {
 fn pool(threads: usize) -> Result<ThreadPool> {
     // GEOS reports the faults of invalid geometries on the calling thread.
     let pool = ThreadPool::new(threads, ffi_errors::hush, ffi_errors::unhush);
-    pool.map_err(|error| Error::Threads(error.to_string()))
+    pool.map_err(Error::Threads)
 }
 
 fn read_key(path: &str) -> Result<SecretKey> {
@@ -239,7 +239,6 @@ fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<Stri
         layers: options.layers.as_deref(),
         srs: options.srs.as_deref(),
         labels: LabelFields::None,
-        target: TargetCrs::Own,
         geometries: options.record_path.is_some(),
         most_vertices: MOST_VERTICES,
         last_failure,

@@ -1,6 +1,6 @@
 //! The record as a file, which is written whole or not at all, and never over another one.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, RecordFault, Result};
 use meshmark_dataset::workplace::folder_of;
 use std::{
     fs::{self, Permissions},
@@ -11,19 +11,21 @@ use std::{
 
 /// Checks, before the mark is computed, that a record can be written to this path.
 pub fn check_folder(path: &Path) -> Result<()> {
-    let reason = match folder_of(path) {
-        folder if !folder.is_dir() => format!("{} is no folder", folder.display()),
-        _ if path.is_dir() => "it is a folder".into(),
-        _ => return Ok(()),
-    };
-    Err(Error::RecordUnwritable { path: path.display().to_string(), reason })
+    match folder_of(path) {
+        folder if !folder.is_dir() => Err(unwritable(path, RecordFault::NoFolder(folder.into()))),
+        _ if path.is_dir() => Err(unwritable(path, RecordFault::IsFolder)),
+        _ => Ok(()),
+    }
+}
+
+fn unwritable(path: &Path, source: RecordFault) -> Error {
+    Error::RecordUnwritable { path: path.display().to_string(), source }
 }
 
 /// Writes the record. An existing file with the same content is accepted, as hosts open a map more
 /// than once.
 pub fn write(path: &Path, text: &str) -> Result<()> {
-    let unwritable =
-        |e: io::Error| Error::RecordUnwritable { path: path.display().to_string(), reason: e.to_string() };
+    let failed = |error: io::Error| unwritable(path, error.into());
     if is_same(path, text)? {
         return Ok(());
     }
@@ -31,16 +33,16 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
         .prefix(".meshmark-record-")
         .permissions(Permissions::from_mode(0o666)) // less the process's umask, as for any file
         .tempfile_in(folder_of(path))
-        .map_err(unwritable)?;
-    file.write_all(text.as_bytes()).map_err(unwritable)?;
-    file.as_file().sync_all().map_err(unwritable)?;
+        .map_err(failed)?;
+    file.write_all(text.as_bytes()).map_err(failed)?;
+    file.as_file().sync_all().map_err(failed)?;
     match file.persist_noclobber(path) {
         Ok(_) => Ok(()),
-        Err(failed) if failed.error.kind() == ErrorKind::AlreadyExists => match is_same(path, text)? {
+        Err(persist) if persist.error.kind() == ErrorKind::AlreadyExists => match is_same(path, text)? {
             true => Ok(()),
-            false => Err(unwritable(io::Error::other("it is a link to a file that does not exist"))),
+            false => Err(unwritable(path, RecordFault::DanglingLink)),
         },
-        Err(failed) => Err(unwritable(failed.error)),
+        Err(persist) => Err(failed(persist.error)),
     }
 }
 

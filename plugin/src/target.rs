@@ -8,7 +8,7 @@ use crate::{
 };
 use meshmark_core::options::Creation;
 use meshmark_dataset::{
-    file_error,
+    Action, file_error,
     formats::Format,
     same_file,
     workplace::{Workplace, folder_of},
@@ -126,7 +126,7 @@ impl Target {
         if !self.path.is_file() {
             return Ok(Vec::new());
         }
-        let entries = fs::read_dir(made).map_err(|e| file_error("reading", made, e))?;
+        let entries = fs::read_dir(made).map_err(|e| file_error(Action::Reading, made, e))?;
         let mut names: Vec<OsString> = entries.flatten().map(|entry| entry.file_name()).collect();
         if names.len() > 1 {
             let stale = ["dbf", "shx", "prj", "cpg", "qix", "sbn", "sbx", "qpj", "idm", "ind"];

@@ -21,7 +21,7 @@ use crate::{
     target::{Places, Target},
 };
 use meshmark_dataset::{
-    file_error,
+    Action, file_error,
     marking::foreign_places,
     publication::{Move, Publication},
 };
@@ -226,7 +226,7 @@ fn write_marked(
 fn publish(target: &Target, places: &Places, folder: &Path, record: Option<&str>) -> Result<()> {
     let mut publication = Publication { overwrite: target.replaces, ..Publication::default() };
     if let Some(((staged, to), record)) = places.record.as_ref().zip(record) {
-        fs::write(staged, record).map_err(|e| file_error("writing", staged, e))?;
+        fs::write(staged, record).map_err(|e| file_error(Action::Writing, staged, e))?;
         let is_there = fs::read(to).is_ok_and(|bytes| bytes == record.as_bytes());
         if !is_there {
             publication.companions.push(Move { from: staged.clone(), to: to.clone() });
@@ -239,7 +239,7 @@ fn publish(target: &Target, places: &Places, folder: &Path, record: Option<&str>
             .retired
             .push(Move { to: retired_folder.join(path.file_name().unwrap_or_default()), from: path });
     }
-    let entries = fs::read_dir(folder).map_err(|e| file_error("reading", folder, e))?;
+    let entries = fs::read_dir(folder).map_err(|e| file_error(Action::Reading, folder, e))?;
     for entry in entries.flatten() {
         if entry.path().is_dir() {
             return Err(meshmark_dataset::Error::Folder { driver: target.format.driver }.into());

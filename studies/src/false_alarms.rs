@@ -1,6 +1,6 @@
-//! How often the verifier would accuse the innocent: p-values of wrong keys and of wrong
-//! recipients, which must be uniform. A suspect is examined once as `meshmark verify` does; what
-//! depends on key and recipient is then repeated for many of them.
+//! Counts how often the verifier would accuse the innocent: p-values of wrong keys and of wrong
+//! recipients, which must be uniform. A suspect is examined once as in `meshmark verify`; the steps
+//! that depend on key and recipient are then repeated for many of them.
 
 use crate::plot::{Axis, Plot, Series};
 use meshmark_core::{
@@ -33,7 +33,7 @@ use std::{
 /// The grid of the maps, as in the paper's experiments.
 const PRECISION_M: f64 = 0.1;
 
-/// What was done to a suspect, and the p-values it gave.
+/// A suspect and its p-values.
 #[derive(Debug, Serialize)]
 pub struct Sample {
     pub map: String,
@@ -44,8 +44,8 @@ pub struct Sample {
     pub wrong_recipients: Vec<f64>,
 }
 
-/// A kind of suspect: its name, whether it is marked, and the row of Table 2 that it is put
-/// through.
+/// The kinds of suspects: the name, whether it is marked, and the row of Table 2 by which it is
+/// attacked.
 const SUSPECTS: [(&str, bool, Option<&str>); 9] = [
     ("marked", true, None),
     ("marked, noise ±50 cm", true, Some("9c")),
@@ -58,12 +58,12 @@ const SUSPECTS: [(&str, bool, Option<&str>); 9] = [
     ("unmarked, local deformation", false, Some("6")),
 ];
 
-/// Takes `count` wrong keys and as many wrong recipients to every suspect made of one map. The
-/// right key and, after it, the wrong ones come from `seed`; no suspect meets those of another, for
+/// Tests `count` wrong keys and as many wrong recipients on every suspect made of one map. The
+/// right key and, after it, the wrong ones follow from `seed`. No two suspects share wrong keys, as
 /// p-values of one key on two copies of a map are not independent.
 ///
 /// # Errors
-/// A map that cannot be read, marked or registered.
+/// Fails on a map that cannot be read, marked or registered.
 pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<Vec<Sample>> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
@@ -130,7 +130,7 @@ fn decide(found: &Demodulation, carried: Message) -> Decision {
     decide_among(found, Power::KeyShows, &Expected { carried, null: Null::RandomMessage }, 1, 1e-6)
 }
 
-/// log₁₀ of p_mark of another key and its message for the recipient.
+/// Returns log₁₀ of p_mark of another key and its message for the recipient.
 fn wrong_key(found: &Demodulation, key: &SecretKey) -> f64 {
     let (carrier, chip_rate) = (Carrier::new(key), Parameters::default().chip_rate);
     let carriers = found.scores.len() * chip_rate;
@@ -150,7 +150,7 @@ fn wrong_recipient(found: &Demodulation, key: &SecretKey, number: usize) -> f64 
     decide(found, message).p_recipient_log10.expect("a message was expected")
 }
 
-/// How far values are from uniform on [0, 1].
+/// The deviation of values from the uniform distribution on [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Uniformity {
     pub count: usize,
@@ -163,8 +163,8 @@ pub struct Uniformity {
 }
 
 impl Uniformity {
-    /// Kolmogorov–Smirnov test with the small-sample factor of Stephens 1970.
-    pub fn of(mut values: Vec<f64>) -> Self {
+    /// Performs the Kolmogorov–Smirnov test with the small-sample factor of Stephens 1970.
+    pub fn measure(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;
         let gap = |(i, v): (usize, &f64)| ((i + 1) as f64 / n - v).max(v - i as f64 / n);
@@ -176,7 +176,7 @@ impl Uniformity {
     }
 }
 
-/// The p-values of some samples, wrong keys first.
+/// Returns the p-values of some samples, wrong keys first.
 pub fn pooled<'a>(samples: impl Iterator<Item = &'a Sample>) -> [Vec<f64>; 2] {
     let mut pools = [Vec::new(), Vec::new()];
     for sample in samples {
@@ -186,17 +186,18 @@ pub fn pooled<'a>(samples: impl Iterator<Item = &'a Sample>) -> [Vec<f64>; 2] {
     pools
 }
 
-/// Observed against expected p-values, −log₁₀: a straight line when they are uniform.
+/// Plots observed against expected p-values, −log₁₀: a straight line when they are uniform.
 ///
 /// # Errors
-/// As [`Plot::to_svg`].
+/// Fails like [`Plot::to_svg`].
 pub fn quantile_plot(pools: &[Vec<f64>; 2]) -> Result<String> {
     let series = |name: &str, values: &Vec<f64>, colour| {
         let mut sorted = values.clone();
         sorted.sort_by(f64::total_cmp);
         let n = sorted.len() as f64;
         let point = |(i, p): (usize, &f64)| (-((i as f64 + 0.5) / n).log10(), -p.log10());
-        // The many large ones would hide each other: all of the first hundred, then ever fewer.
+        // The many large values would hide each other, so fewer and fewer are drawn after the first
+        // hundred.
         let shown = |i: &usize| *i < 100 || i.is_multiple_of(*i / 50);
         let points = sorted.iter().enumerate().filter(|(i, _)| shown(i)).map(point).collect();
         Series { name: name.into(), points, colour, thin: false }
@@ -216,7 +217,7 @@ pub fn quantile_plot(pools: &[Vec<f64>; 2]) -> Result<String> {
     .to_svg()
 }
 
-/// The result as Markdown.
+/// Returns the result as Markdown.
 pub fn markdown(samples: &[Sample], seed: u64) -> String {
     let mut text = format!(
         "Seed {seed}. Kolmogorov–Smirnov distance D from the uniform distribution, and the probability of as much or more.\n\n\
@@ -224,7 +225,7 @@ pub fn markdown(samples: &[Sample], seed: u64) -> String {
         "---|".repeat(9)
     );
     let mut row = |name: &str, samples: Vec<&Sample>| {
-        let [keys, recipients] = pooled(samples.into_iter()).map(Uniformity::of);
+        let [keys, recipients] = pooled(samples.into_iter()).map(Uniformity::measure);
         let cells =
             |u: Uniformity| format!("{} | {:.4} | {:.2} | {:.1e}", u.count, u.distance, u.p_value, u.least);
         text += &format!("| {name} | {} | {} |\n", cells(keys), cells(recipients));
@@ -236,10 +237,10 @@ pub fn markdown(samples: &[Sample], seed: u64) -> String {
     text
 }
 
-/// Where the results go: `false_alarms.md`, `.json` and `.svg`.
+/// Writes the results: `false_alarms.md`, `.json` and `.svg`.
 ///
 /// # Errors
-/// A file cannot be written.
+/// Fails when a file cannot be written.
 pub fn write(folder: &Path, samples: &[Sample], seed: u64) -> Result<PathBuf> {
     std::fs::create_dir_all(folder)?;
     let table = folder.join("false_alarms.md");
@@ -258,11 +259,11 @@ mod tests {
     fn uniform_numbers_pass_and_squares_of_them_do_not() {
         let mut random = Random::new(1);
         let uniform: Vec<f64> = (0..5000).map(|_| random.unit()).collect();
-        assert!(Uniformity::of(uniform.clone()).p_value > 0.01);
-        assert!(Uniformity::of(uniform.iter().map(|u| u * u).collect()).p_value < 1e-9);
+        assert!(Uniformity::measure(uniform.clone()).p_value > 0.01);
+        assert!(Uniformity::measure(uniform.iter().map(|u| u * u).collect()).p_value < 1e-9);
         // Stephens 1970: 1.358 is the 5 % point of (√n + 0.12 + 0.11/√n) D.
         let distance = 1.358 / (10.0 + 0.12 + 0.011);
         let shifted = (1..=100).map(|i| (f64::from(i) / 100.0 - distance).max(0.0)).collect();
-        assert!((Uniformity::of(shifted).p_value - 0.05).abs() < 0.001);
+        assert!((Uniformity::measure(shifted).p_value - 0.05).abs() < 0.001);
     }
 }

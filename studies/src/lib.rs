@@ -1,5 +1,5 @@
-//! Studies of what marks survive and what they cost a map; each program of `src/bin` makes a table
-//! of the documents.
+//! Studies of the robustness of marks and of their effect on maps; each program of `src/bin` makes
+//! a table of the documents.
 
 pub mod false_alarms;
 pub mod misses;

@@ -1,5 +1,6 @@
-//! How often the verifier would clear the guilty: verdicts on copies that carry the mark, worn more
-//! and more. A copy may be too worn for a match; "no match" is then a false statement.
+//! Counts how often the verifier would exclude a guilty recipient: verdicts on copies that carry
+//! the mark, at increasing damage. A copy may be too damaged for a match, but "no match" is then a
+//! false statement.
 
 use meshmark_host_tests::{
     Result,
@@ -15,17 +16,18 @@ use std::{collections::BTreeMap, path::Path};
 /// The grid of the maps, as in the paper's experiments.
 const PRECISION_M: f64 = 0.1;
 
-/// The verdict on one worn copy.
+/// The verdict on one damaged copy.
 #[derive(Debug, Clone, Serialize)]
-pub struct Worn {
+pub struct Damaged {
     pub map: String,
-    pub wear: String,
+    pub damage: String,
     pub verdict: String,
     pub p_value_log10: Option<f64>,
     pub reason: String,
 }
 
-/// Ways to wear a map: a name, the least and the largest strength, and the attack of a strength.
+/// A way to damage a map: its name, the least and the largest strength, and the attack of a
+/// strength.
 type Way = (&'static str, f64, f64, fn(f64) -> Attack);
 
 const WAYS: [Way; 17] = [
@@ -48,12 +50,12 @@ const WAYS: [Way; 17] = [
     ("boxes", 0.0, 1.0, |_| Attack::Outline(Outline::BoundingBox)),
 ];
 
-/// Wears `count` copies of a map, each in one or two ways of random strength, and verifies them for
-/// their recipient.
+/// Damages `count` copies of a map, each in one or two ways of random strength, and verifies them
+/// for their recipient.
 ///
 /// # Errors
-/// A map that cannot be read or marked.
-pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<Vec<Worn>> {
+/// Fails on a map that cannot be read or marked.
+pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<Vec<Damaged>> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
     let (key, reference, marked, record) =
@@ -66,24 +68,24 @@ pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<V
     let marked = Map::read(&marked)?;
     let name = map.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut random = Random::new(seed);
-    let mut worn = Vec::new();
-    while worn.len() < count {
-        let (wear, attack) = draw(&mut random);
+    let mut copies = Vec::new();
+    while copies.len() < count {
+        let (damage, attack) = draw(&mut random);
         let suspect = attack.apply(&marked, random.seed())?;
         if suspect.coords().next().is_none() {
-            continue; // nothing is left to ask about
+            continue; // nothing is left to verify
         }
         let file = path("suspect.gpkg");
         suspect.write(&file)?;
         let report = product.verify(&key, &reference, Asked::Record(&record), "joint", "auto", &file)?;
         std::fs::remove_file(&file)?;
         let (map, verdict, reason) = (name.clone(), report.verdict, report.reason);
-        worn.push(Worn { map, wear, verdict, p_value_log10: report.p_value_log10, reason });
+        copies.push(Damaged { map, damage, verdict, p_value_log10: report.p_value_log10, reason });
     }
-    Ok(worn)
+    Ok(copies)
 }
 
-/// Draws a wear: one way, or two after one another.
+/// Draws the damage of a copy: one way, or two in sequence.
 fn draw(random: &mut Random) -> (String, Attack) {
     let mut one = || {
         let (name, least, most, attack) = WAYS[random.below(WAYS.len())];
@@ -98,25 +100,25 @@ fn draw(random: &mut Random) -> (String, Attack) {
     (format!("{first}, {second}"), Attack::Sequence(vec![attack, more]))
 }
 
-/// The result as Markdown: verdicts by the first way, and every false "no match".
-pub fn markdown(worn: &[Worn], seed: u64) -> String {
+/// Returns the result as Markdown: verdicts by the first way, and every false "no match".
+pub fn markdown(copies: &[Damaged], seed: u64) -> String {
     let mut rows: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
-    for w in worn {
-        let way = w.wear.rsplit_once(", ").map_or(w.wear.as_str(), |(first, _)| first);
+    for w in copies {
+        let way = w.damage.rsplit_once(", ").map_or(w.damage.as_str(), |(first, _)| first);
         let way = way.rsplit_once(' ').map_or(way, |(name, _)| name);
         let index = ["match", "inconclusive", "no-match"].iter().position(|v| *v == w.verdict).unwrap_or(1);
         rows.entry(way).or_default()[index] += 1;
         rows.entry("~ all").or_default()[index] += 1;
     }
     let mut text = format!(
-        "Seed {seed}. Copies that carry the mark, worn in one or two ways of random strength; the first way is named.\n\n\
-         | wear | match | inconclusive | no match |\n|---|---|---|---|\n"
+        "Seed {seed}. Copies that carry the mark, damaged in one or two ways of random strength; the first way is named.\n\n\
+         | damage | match | inconclusive | no match |\n|---|---|---|---|\n"
     );
     for (way, [matches, unclear, missed]) in rows {
         text += &format!("| {} | {matches} | {unclear} | {missed} |\n", way.trim_start_matches("~ "));
     }
-    for w in worn.iter().filter(|w| w.verdict == "no-match") {
-        text += &format!("\nFalse no match: {}, {}, log10 p {:.1?}.\n", w.map, w.wear, w.p_value_log10);
+    for w in copies.iter().filter(|w| w.verdict == "no-match") {
+        text += &format!("\nFalse no match: {}, {}, log10 p {:.1?}.\n", w.map, w.damage, w.p_value_log10);
     }
     text
 }
@@ -127,20 +129,20 @@ mod tests {
 
     #[test]
     fn a_false_no_match_is_counted_and_named() {
-        let worn = |wear: &str, verdict: &str| Worn {
+        let copy = |damage: &str, verdict: &str| Damaged {
             map: "town".into(),
-            wear: wear.into(),
+            damage: damage.into(),
             verdict: verdict.into(),
             p_value_log10: Some(-0.3),
             reason: String::new(),
         };
-        let text = markdown(&[worn("noise 3.00, piece 50.00", "no-match"), worn("noise 0.30", "match")], 7);
+        let text = markdown(&[copy("noise 3.00, piece 50.00", "no-match"), copy("noise 0.30", "match")], 7);
         assert!(text.contains("| noise | 1 | 0 | 1 |") && text.contains("| all | 1 | 0 | 1 |"), "{text}");
         assert!(text.contains("False no match: town, noise 3.00, piece 50.00"), "{text}");
     }
 
     #[test]
-    fn equal_seeds_draw_equal_wear() {
+    fn equal_seeds_draw_equal_damage() {
         let draws = |seed| {
             let mut random = Random::new(seed);
             (0..20).map(|_| draw(&mut random).0).collect::<Vec<_>>()

@@ -8,7 +8,7 @@ pub struct Series {
     pub name: String,
     pub points: Vec<(f64, f64)>,
     pub colour: RGBColor,
-    /// Thin and without a mark at every point: what ours is compared with.
+    /// Whether the line is thin and has no mark at its points: a result to compare ours with.
     pub thin: bool,
 }
 
@@ -30,12 +30,12 @@ pub struct Plot {
 }
 
 impl Axis {
-    /// An axis with equal steps.
+    /// Returns an axis with equal steps.
     pub fn linear(label: &str) -> Self {
         Axis { label: label.into(), log: false }
     }
 
-    /// An axis with equal factors.
+    /// Returns an axis with equal factors.
     pub fn log(label: &str) -> Self {
         Axis { label: label.into(), log: true }
     }
@@ -44,7 +44,7 @@ impl Axis {
         if self.log { value.log10() } else { value }
     }
 
-    /// What to print at a place of the axis: three digits.
+    /// Returns the label of a place on the axis, with three digits.
     fn tick(&self, scaled: f64) -> String {
         let value = if self.log { 10f64.powf(scaled) } else { scaled };
         let digits = (2.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 12.0) as usize;
@@ -52,7 +52,7 @@ impl Axis {
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
     }
 
-    /// The range that shows all `values`; a linear axis shows 0, too.
+    /// Returns the range that shows all `values`; a linear axis shows 0, too.
     fn range(&self, values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
         let start = if self.log { (f64::INFINITY, f64::NEG_INFINITY) } else { (0.0, 0.0) };
         let (low, high) = values.fold(start, |(low, high), value| {
@@ -64,10 +64,10 @@ impl Axis {
 }
 
 impl Plot {
-    /// The drawing.
+    /// Returns the drawing.
     ///
     /// # Errors
-    /// None is known: nothing is written to a file.
+    /// Fails when plotters fails; no cause is known, as no file is written.
     pub fn to_svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
         let mut svg = String::new();
         self.draw(&SVGBackend::with_string(&mut svg, (680, 380)).into_drawing_area())

@@ -1,9 +1,13 @@
 //! The errors that end a command early. Every message names the input and the remedy.
 
-use crate::exit_code::ExitCode;
+use crate::{
+    exit_code::ExitCode,
+    inputs::{gdal_failures::GdalFailure, unsuitable::Unsuitable},
+};
+use gdal::errors::GdalError;
 use meshmark_core::{counted, options::Spelling};
-use meshmark_dataset::Error as MapError;
-use std::{io, path::PathBuf};
+use meshmark_dataset::{Error as MapError, marking::NotMoved, wkb::WkbError};
+use std::{io, path::PathBuf, string::FromUtf8Error};
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -76,10 +80,10 @@ pub enum Error {
     NoOgr2ogr { source: io::Error },
     #[error("this GDAL writes FlatGeobuf as no other that was seen: write GPKG, and convert the copies")]
     UnknownFlatGeobuf,
-    #[error("no threads can be started ({reason})")]
-    Threads { reason: String },
-    #[error("the operating system gives no random bytes: {reason}")]
-    Random { reason: String },
+    #[error("no threads can be started ({source})")]
+    Threads { source: io::Error },
+    #[error("the operating system gives no random bytes: {source}")]
+    Random { source: getrandom::Error },
 
     // --- what does not belong together ---
     #[error(
@@ -104,30 +108,36 @@ pub enum Error {
     SeveralReferences,
 
     // --- inputs that cannot be read ---
-    #[error("the {what} {} cannot be opened: {reason}", path.display())]
-    Unopened { what: &'static str, path: PathBuf, reason: String },
+    #[error("the {what} {} cannot be opened: {source}", path.display())]
+    Unopened { what: &'static str, path: PathBuf, source: GdalFailure },
     #[error("the suspect {} {reason}: convert it with \"{command}\"{place}, and verify the copy", path.display())]
-    Unconverted { path: PathBuf, reason: String, command: String, place: &'static str },
+    Unconverted {
+        path: PathBuf,
+        #[source]
+        reason: Box<Unsuitable>,
+        command: String,
+        place: &'static str,
+    },
     #[error("the {what} {}: {source}", path.display())]
     Unmeasured { what: &'static str, path: PathBuf, source: Box<MapError> },
     #[error("{} cannot be read to its end: {source}", path.display())]
     Undigested { path: PathBuf, source: io::Error },
     #[error("the suspect {} is not a file here: give a local file", path.display())]
     NoFile { path: PathBuf },
-    #[error("GDAL takes no option: {reason}")]
-    NoOption { reason: String },
+    #[error("GDAL takes no option: {source}")]
+    NoOption { source: GdalError },
     #[error("the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr", path.display())]
     OtherTables { path: PathBuf },
-    #[error("the suspect {} cannot be read: {reason}", path.display())]
-    Unread { path: PathBuf, reason: String },
+    #[error("the suspect {} cannot be read: {source}", path.display())]
+    Unread { path: PathBuf, source: Box<Cause> },
     #[error(
         "the suspect {} has a virtual table \"{table}\", which may point at other files: copy its layers to a plain file, \
          for example with ogr2ogr",
         path.display()
     )]
     VirtualTable { path: PathBuf, table: String },
-    #[error("the map as a GeoPackage cannot be read: {reason}")]
-    StagedUnread { reason: String },
+    #[error("the map as a GeoPackage cannot be read: {source}")]
+    StagedUnread { source: Cause },
     #[error("ogr2ogr cannot copy {} to {format}: {reason}", path.display())]
     Ogr2ogr { path: PathBuf, format: String, reason: String },
     #[error(
@@ -138,9 +148,7 @@ pub enum Error {
 
     // --- outputs that cannot be written ---
     #[error("{what} cannot be written: {source}{remedy}")]
-    Unwritten { what: String, source: io::Error, remedy: &'static str },
-    #[error("{what} cannot be written: {reason}")]
-    NotWritten { what: String, reason: String },
+    Unwritten { what: String, source: Box<Cause>, remedy: &'static str },
     #[error("the answer cannot be printed: {source}")]
     Unprinted { source: io::Error },
     #[error("the output folder {} cannot be made ({source}): name one that can be", path.display())]
@@ -156,25 +164,46 @@ pub enum Error {
     Stopped { source: Box<Error>, done: usize, all: usize },
 }
 
+/// A failure of a library in one of many steps of a piece of work.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+#[allow(missing_docs)] // the messages are the documentation
+pub enum Cause {
+    Io(#[from] io::Error),
+    Gdal(#[from] GdalError),
+    GdalFailure(#[from] GdalFailure),
+    Sqlite(#[from] rusqlite::Error),
+    Wkb(#[from] WkbError),
+    NotMoved(#[from] NotMoved),
+    NotUtf8(#[from] FromUtf8Error),
+    /// The fault of a spatial index.
+    #[error("{0}")]
+    SpatialIndex(&'static str),
+}
+
 impl Error {
+    /// Creates the error of an output for which there is no remedy but another try.
+    pub fn unwritten(what: impl ToString, source: impl Into<Cause>) -> Self {
+        Error::Unwritten { what: what.to_string(), source: Box::new(source.into()), remedy: "" }
+    }
+
     /// Returns whether the layers and the CRS that a request names allow no mark on a map.
-    pub fn is_about_options(&self) -> bool {
+    pub(crate) fn is_about_options(&self) -> bool {
         use meshmark_dataset::Error as Map;
+        let Error::Map { source, .. } = self else { return false };
         matches!(
-            self,
-            Error::Dataset(
-                Map::NoLayers
-                    | Map::UnknownLayer { .. }
-                    | Map::MixedCrs { .. }
-                    | Map::NoCrs
-                    | Map::Geocentric(_)
-                    | Map::ContradictingSrs { .. }
-                    | Map::UnknownSrs(_)
-                    | Map::Reprojection { .. }
-                    | Map::TooSmall { .. }
-                    | Map::UnevenScale { .. }
-                    | Map::Core(_)
-            )
+            **source,
+            Map::NoLayers
+                | Map::UnknownLayer { .. }
+                | Map::MixedCrs { .. }
+                | Map::NoCrs
+                | Map::Geocentric(_)
+                | Map::ContradictingSrs { .. }
+                | Map::UnknownSrs(_)
+                | Map::Reprojection { .. }
+                | Map::TooSmall { .. }
+                | Map::UnevenScale { .. }
+                | Map::Core(_)
         )
     }
 
@@ -183,7 +212,9 @@ impl Error {
         use Error::*;
         match self {
             Map { source, .. } => of_map_that_is_read(source),
-            Dataset(MapError::File { action, .. }) if *action != "reading" => ExitCode::Unwritable,
+            Dataset(MapError::File { .. } | MapError::NotKept { .. } | MapError::Gdal(_)) => {
+                ExitCode::Unwritable
+            }
             OtherKey { .. } | OtherMessage | OtherReference { .. } | NoReferenceOfRecord { .. } => {
                 ExitCode::DoesNotBelong
             }
@@ -199,7 +230,7 @@ impl Error {
             | StagedUnread { .. }
             | Ogr2ogr { .. }
             | MapChanged => ExitCode::Unreadable,
-            Unwritten { .. } | NotWritten { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
+            Unwritten { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
             Copy { source, .. } | Stopped { source, .. } => source.exit_code(),
             _ => ExitCode::Usage,
         }

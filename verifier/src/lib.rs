@@ -1,7 +1,7 @@
 //! The verifier decides whether a suspect is a copy of a given marked map.
 //!
 //! The data flows one way: [`inputs`] → [`verify`](mod@verify), which passes numbers to
-//! `meshmark-detection` → [`report`] → [`html`]. [`compare`] measures the effect of marking on a
+//! `meshmark-detection` → [`report`] → [`html`] → [`outputs`]. [`compare`] measures the effect of marking on a
 //! map, [`distribute`] marks a map for many recipients.
 #![forbid(unsafe_code)]
 
@@ -11,11 +11,13 @@ mod error;
 mod exit_code;
 pub mod html;
 pub mod inputs;
+pub mod outputs;
 pub mod progress;
 pub mod report;
+mod thinning;
 pub mod verify;
 pub mod words;
 
-pub use error::{Error, Result};
+pub use error::{Cause, Error, Result};
 pub use exit_code::ExitCode;
 pub use verify::{Request, verify, verify_records};

@@ -14,7 +14,7 @@ pub fn printable(text: &str) -> String {
 
 /// Quotes a word for a shell. Characters that change the text direction are escaped for bash, zsh
 /// and ksh.
-pub(crate) fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
     if printable(word) != word {
         let escaped = word.chars().map(|c| match c {

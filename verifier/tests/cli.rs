@@ -94,6 +94,11 @@ fn make_records(folder: &Path, record: &str) {
     fs::write(folder.join("one_record/acme.json"), record).unwrap();
     fs::write(folder.join("one_record/notes.txt"), "no record").unwrap();
     fs::write(folder.join("one_record/no_record.json"), "[1]").unwrap();
+    fs::create_dir_all(folder.join("records_of_layers")).unwrap();
+    fs::write(folder.join("records_of_layers/acme.json"), record).unwrap();
+    let of_layer = record.replace("\"layers\": null", "\"layers\": [\"streets\"]");
+    assert_ne!(of_layer, record);
+    fs::write(folder.join("records_of_layers/streets.json"), of_layer).unwrap();
     for (file, text) in [
         ("acme.json", record.to_string()),
         ("other.json", of("Another Ltd")),

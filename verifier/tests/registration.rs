@@ -1,4 +1,6 @@
-//! The way back is found, from what is left: polygons, lines, points, parts, thinned or bent maps.
+//! The registration finds the way back from what is left: polygons, lines, points, parts, thinned or
+//! bent maps. The tests are in this crate because they read their maps through GDAL, on which
+//! `detection` does not depend.
 
 use meshmark_core::{
     ground::Ground,
@@ -35,7 +37,7 @@ impl Random {
 }
 
 impl Map {
-    fn of(polylines: Vec<Polyline>) -> Self {
+    fn from_polylines(polylines: Vec<Polyline>) -> Self {
         Map {
             points: polylines.iter().flat_map(|polyline| polyline.vertices.iter().copied()).collect(),
             polylines,
@@ -44,7 +46,7 @@ impl Map {
 
     fn fixture(name: &str) -> Self {
         let path = format!("{}/../fixtures/{name}.gpkg", env!("CARGO_MANIFEST_DIR"));
-        Map::of(
+        Map::from_polylines(
             survey(
                 &gdal::Dataset::open(path).unwrap(),
                 &Selection { labels: LabelFields::Named(&[]), ..Selection::default() },
@@ -69,7 +71,7 @@ impl Map {
             };
             Polyline { vertices: (0..25).map(step).collect(), closed: false }
         };
-        Map::of((0..40).map(&mut road).collect())
+        Map::from_polylines((0..40).map(&mut road).collect())
     }
 
     /// Points alone, 15 m apart or so.
@@ -81,7 +83,7 @@ impl Map {
 
     fn only(mut self, closed: bool) -> Self {
         self.polylines.retain(|polyline| polyline.closed == closed);
-        Map::of(self.polylines)
+        Map::from_polylines(self.polylines)
     }
 
     fn without_polylines(self) -> Self {
@@ -165,7 +167,7 @@ fn lines_of_which_a_third_of_the_vertices_is_deleted_give_the_affine_map() {
         for polyline in &mut map.polylines {
             polyline.vertices.retain(|_| random.symmetric(1.5).abs() < 1.0);
         }
-        Map::of(map.polylines)
+        Map::from_polylines(map.polylines)
     };
     assert_found(&Map::roads(), thinned, 0.03);
 }
@@ -175,7 +177,7 @@ fn pieces_of_lines_give_the_affine_map() {
     let cut = |mut map: Map| {
         map.polylines.iter_mut().for_each(|polyline| polyline.vertices.retain(|v| v[0] < 0.0));
         map.polylines.retain(|polyline| polyline.vertices.len() > 1);
-        Map::of(map.polylines)
+        Map::from_polylines(map.polylines)
     };
     assert_found(&Map::roads(), cut, 0.05);
 }
@@ -246,7 +248,7 @@ fn a_map_with_ten_times_the_vertices_is_registered_too() {
         }
         polyline.vertices = dense;
     }
-    let suspect = Map::of(suspect.polylines);
+    let suspect = Map::from_polylines(suspect.polylines);
     assert!(suspect.vertices().len() > 10 * reference.vertices().len());
     let found = register(&reference, &suspect.moved(|p| there.apply(p)), Start::Geometry);
     let error_m = error_m(&reference, |p| there.apply(p), &found);
@@ -256,7 +258,7 @@ fn a_map_with_ten_times_the_vertices_is_registered_too() {
 #[test]
 fn nothing_is_found_where_there_is_nothing_to_find() {
     let reference = Map::fixture("kotka");
-    let empty = Map::of(Vec::new());
+    let empty = Map::from_polylines(Vec::new());
     let one = Map { points: vec![[1.0, 2.0]], polylines: Vec::new() };
     let row = Map { points: (0..500).map(|i| [i as f64, 2.0 * i as f64]).collect(), polylines: Vec::new() };
     let same = Map { points: vec![[1e9, 1e9]; 50], polylines: Vec::new() };

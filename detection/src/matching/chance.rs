@@ -11,13 +11,13 @@ pub(crate) const OUT_OF_PLACE: [f64; 2] = [7.3, -5.1];
 
 /// Returns whether `matched` vertices are no more than chance yields, where `by_chance` match out
 /// of place.
-pub fn is_chance(matched: usize, by_chance: usize) -> bool {
+pub(crate) fn is_chance(matched: usize, by_chance: usize) -> bool {
     matched < LEAST_MATCHED || matched < TIMES_CHANCE * by_chance
 }
 
 /// Returns a shift that moves any map out of place, CRS units; `unit_m` are the metres per unit
 /// along each axis.
-pub fn out_of_place(unit_m: [f64; 2], radius_m: f64) -> [f64; 2] {
+pub(crate) fn out_of_place(unit_m: [f64; 2], radius_m: f64) -> [f64; 2] {
     [0, 1].map(|axis| OUT_OF_PLACE[axis] * radius_m / unit_m[axis].max(f64::MIN_POSITIVE))
 }
 

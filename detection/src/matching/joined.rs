@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// The graph of vertices that rings and lines join, as concatenated lists of neighbours.
 #[derive(Debug, Clone)]
-pub struct Graph {
+pub(crate) struct Graph {
     /// Index of the first neighbour of vertex v; entry v + 1 is the end of its list.
     starts: Vec<u32>,
     neighbours: Vec<u32>,

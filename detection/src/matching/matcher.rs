@@ -44,13 +44,13 @@ impl<'a> Matcher<'a> {
     }
 
     /// Matches every `step`-th reference vertex.
-    pub fn every(&self, step: usize, suspect: &[[f64; 2]], radius_m: f64) -> Matches {
+    pub(crate) fn every(&self, step: usize, suspect: &[[f64; 2]], radius_m: f64) -> Matches {
         self.mutual(step, suspect, &self.tree_of(suspect), radius_m)
     }
 
     /// Matches every reference vertex. Where several suspect vertices are near, their neighbours
     /// decide. `graphs` are those of the reference and of the suspect.
-    pub fn joined(&self, suspect: &[[f64; 2]], radius_m: f64, graphs: [&Graph; 2]) -> Matches {
+    pub(crate) fn joined(&self, suspect: &[[f64; 2]], radius_m: f64, graphs: [&Graph; 2]) -> Matches {
         let tree = self.tree_of(suspect);
         let nearest = self.mutual(1, suspect, &tree, radius_m);
         let near = |reference: u32| {
@@ -63,12 +63,12 @@ impl<'a> Matcher<'a> {
     }
 
     /// Returns the number of reference vertices.
-    pub fn reference_count(&self) -> usize {
+    pub(crate) fn reference_count(&self) -> usize {
         self.reference.len()
     }
 
     /// Returns the distance of every match, metres.
-    pub fn distances_m(&self, suspect: &[[f64; 2]], matches: &Matches) -> Vec<f64> {
+    pub(crate) fn distances_m(&self, suspect: &[[f64; 2]], matches: &Matches) -> Vec<f64> {
         let displacements = matches.displacements_m(self.reference, suspect, self.ground);
         displacements.into_iter().flatten().map(|[x, y]| x.hypot(y)).collect()
     }
@@ -123,7 +123,7 @@ impl<'a> Matcher<'a> {
 }
 
 /// The vertices of a suspect near those of its reference.
-pub struct Near<'a> {
+pub(crate) struct Near<'a> {
     matcher: &'a Matcher<'a>,
     suspect: &'a [[f64; 2]],
     tree: RTree<Node>,

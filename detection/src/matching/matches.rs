@@ -25,7 +25,7 @@ impl Matches {
     }
 
     /// Drops the matches of all reference vertices that `wanted` rejects.
-    pub fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+    pub(crate) fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         for (vertex, suspect) in self.suspect_of.iter_mut().enumerate() {
             *suspect = suspect.filter(|_| wanted(vertex));
         }

@@ -6,9 +6,10 @@ mod matcher;
 mod matches;
 mod radius;
 
-pub use chance::{LEAST_MATCHED, is_chance, out_of_place};
-pub(crate) use chance::{OUT_OF_PLACE, by_chance};
-pub use joined::Graph;
-pub use matcher::{Matcher, Near};
+pub use chance::LEAST_MATCHED;
+pub(crate) use chance::{OUT_OF_PLACE, by_chance, is_chance, out_of_place};
+pub(crate) use joined::Graph;
+pub use matcher::Matcher;
+pub(crate) use matcher::Near;
 pub use matches::Matches;
 pub use radius::{Radius, RadiusChoice, RadiusReason};

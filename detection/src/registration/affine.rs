@@ -21,7 +21,7 @@ impl Affine {
 
     /// Returns the affine map that gives the points zero mean and unit covariance; the identity
     /// when they lie on a line.
-    pub fn whitening(points: &[[f64; 2]]) -> Self {
+    pub(crate) fn whitening(points: &[[f64; 2]]) -> Self {
         let Some(c) = weighted_mean(points, &vec![1.0; points.len()]) else { return Self::IDENTITY };
         let mean = |f: &dyn Fn(f64, f64) -> f64| {
             points.iter().map(|p| f(p[0] - c[0], p[1] - c[1])).sum::<f64>() / points.len() as f64
@@ -75,7 +75,7 @@ impl Affine {
     /// wrong pairs have little influence (paper, section 3.5). The method is iteratively reweighted
     /// least squares (Weiszfeld 1937); distances below `least_distance` have equal weight.
     /// Distances are in the units of `to`.
-    pub fn fit_robustly(from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
+    pub(crate) fn fit_robustly(from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
         let fit = |weights: &[f64]| Self::fit(from, to, weights);
         least_distances(from, to, least_distance, fit, |affine, p| affine.apply(p))
     }

@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 
 /// Terms of one axis: 1, u, v, u², uv, v², u³, u²v, uv², v³.
-pub const TERMS: usize = 10;
+pub(super) const TERMS: usize = 10;
 
 /// With u = (x − centre x) / scale and v alike: x′ = x + Σ x_i t_i(u, v), y′ = y + Σ y_i t_i(u, v).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -23,7 +23,7 @@ pub struct Cubic {
 
 /// An affine map, followed by an optional cubic polynomial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Transform {
+pub(crate) struct Transform {
     /// The linear part.
     pub affine: Affine,
     /// The nonlinear remainder.
@@ -47,12 +47,12 @@ impl Transform {
 impl Cubic {
     /// Returns the polynomial that leaves every point in its place. Its frame encloses the map: the
     /// centre and half of the longer side.
-    pub fn zero(centre: [f64; 2], scale: f64) -> Self {
+    pub(crate) fn zero(centre: [f64; 2], scale: f64) -> Self {
         Cubic { centre, scale, x: [0.0; TERMS], y: [0.0; TERMS] }
     }
 
     /// Returns the image of `p`.
-    pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn apply(&self, p: [f64; 2]) -> [f64; 2] {
         let terms = self.terms(p);
         let shift = |c: &[f64; TERMS]| c.iter().zip(terms).map(|(c, t)| c * t).sum::<f64>();
         [p[0] + shift(&self.x), p[1] + shift(&self.y)]
@@ -66,7 +66,12 @@ impl Cubic {
     /// Returns the polynomial in the frame of `self` that maps `from` to `to` with the least sum of
     /// distances; `None` when the points do not determine it. `least_distance` has the meaning it
     /// has in [`Affine::fit_robustly`].
-    pub fn fit_robustly(&self, from: &[[f64; 2]], to: &[[f64; 2]], least_distance: f64) -> Option<Self> {
+    pub(crate) fn fit_robustly(
+        &self,
+        from: &[[f64; 2]],
+        to: &[[f64; 2]],
+        least_distance: f64,
+    ) -> Option<Self> {
         let fit = |weights: &[f64]| self.fit(from, to, weights);
         least_distances(from, to, least_distance, fit, |cubic, p| cubic.apply(p))
     }

@@ -22,7 +22,7 @@ mod windows;
 use meshmark_core::map_data::MapData;
 
 pub use affine::Affine;
-pub use cubic::{Cubic, TERMS, Transform};
+pub use cubic::Cubic;
 pub use registrar::Registrar;
 pub use result::{Method, ReadAs, Registration};
 pub use search::Start;

@@ -1,4 +1,4 @@
-//! Attacks on buildings: each is shifted and turned as a rigid body.
+//! Attacks on buildings: each shifts and turns as a rigid body.
 
 use super::{Layer, Map, Random, parts::is_polygonal, similarity::rotation};
 use crate::Result;
@@ -6,7 +6,7 @@ use geo::{Centroid, Coord, Geometry, GeometryCollection, MapCoords};
 use meshmark_core::disjoint_sets::DisjointSets;
 use std::collections::{BTreeMap, HashMap};
 
-/// How far bodies move.
+/// The motion of bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Standard deviation of the shift along either axis, units of the CRS.
@@ -19,7 +19,7 @@ pub struct Motion {
 /// as the houses of a terrace. Lines and points stay.
 ///
 /// # Errors
-/// A body without a centroid.
+/// Fails on a body without a centroid.
 pub fn shift_and_turn(map: &Map, motion: Motion, seed: u64) -> Result<Map> {
     let mut random = Random::new(seed);
     let mut map = map.clone();
@@ -43,7 +43,7 @@ pub fn shift_and_turn(map: &Map, motion: Motion, seed: u64) -> Result<Map> {
     Ok(map)
 }
 
-/// The bodies of a layer, each as the numbers of its features.
+/// Returns the bodies of a layer, each as the numbers of its features.
 fn bodies(layer: &Layer) -> Vec<Vec<usize>> {
     let mut joined = DisjointSets::new(layer.features.len());
     let mut first_with: HashMap<[u64; 2], u32> = HashMap::new();

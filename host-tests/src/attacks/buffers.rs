@@ -1,4 +1,4 @@
-//! Attacks that grow and shrink shapes: what a buffer makes of walls and of the lines of roads.
+//! Attacks that grow and shrink shapes: buffers of walls and of the lines of roads.
 
 use super::{Map, parts::is_polygonal};
 use geo::{
@@ -9,20 +9,20 @@ use geo::{
 /// A corner sharper than this, in radians, is not drawn out to a mitre; GIS stop at five times the
 /// distance.
 const SHARPEST_MITRE: f64 = 0.4;
-/// A tolerance, units of the CRS, that takes away the splinters of edges that the offset leaves at
+/// A tolerance, units of the CRS, that removes the splinters of edges that an offset leaves at
 /// blunt corners.
 const SPLINTERS: f64 = 0.01;
 
-/// What becomes of a convex corner.
+/// The shape of a buffer at a convex corner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Join {
     /// An arc.
     Round,
-    /// A corner again.
+    /// A corner.
     Mitre,
 }
 
-/// What is grown or shrunk by a distance, units of the CRS. Nothing else of the map is left.
+/// Geometries that grow or shrink by a distance, units of the CRS. The rest of the map is dropped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Buffering {
     /// Polygons out and in again.
@@ -34,8 +34,8 @@ pub enum Buffering {
 }
 
 impl Buffering {
-    /// What is left of a map.
-    pub fn of(self, map: &Map) -> Map {
+    /// Returns the rest of a map.
+    pub fn apply(self, map: &Map) -> Map {
         map.map_geometries(|geometry| self.of_geometry(geometry)).of_any_type()
     }
 
@@ -64,7 +64,7 @@ fn style(distance: f64, join: Join) -> BufferStyle<f64> {
     }
 }
 
-/// A polygon, several, or nothing.
+/// Returns one polygon, several, or nothing.
 pub(super) fn one_or_many(mut polygons: MultiPolygon) -> Option<Geometry> {
     match polygons.0.len() {
         0 => None,
@@ -83,7 +83,7 @@ mod tests {
     const SHAPES: [&str; 3] = ["POLYGON ((0 0,6 0,6 5,0 5,0 0))", "LINESTRING (20 0,30 0)", "POINT (1 1)"];
 
     fn areas(buffering: Buffering) -> Vec<f64> {
-        buffering.of(&in_memory(&SHAPES)).geometries().map(Area::unsigned_area).collect()
+        buffering.apply(&in_memory(&SHAPES)).geometries().map(Area::unsigned_area).collect()
     }
 
     fn is_close(areas: &[f64], wanted: f64) -> bool {
@@ -105,7 +105,7 @@ mod tests {
     fn out_and_in_fills_notches_and_brings_corners_back() {
         let notched = in_memory(&["POLYGON ((0 0,9 0,9 5,5 5,5 3,4 3,4 5,0 5,0 0))"]);
         for (join, most) in [(Join::Mitre, 8), (Join::Round, 16)] {
-            let filled = Buffering::OutAndIn { distance: 1.0, join }.of(&notched);
+            let filled = Buffering::OutAndIn { distance: 1.0, join }.apply(&notched);
             let area: f64 = filled.geometries().map(Area::unsigned_area).sum();
             assert!((area - 45.0).abs() < 0.3, "{join:?}: {area}");
             let count = filled.vertices().unwrap().len();
@@ -117,7 +117,7 @@ mod tests {
     fn most_buildings_of_a_real_map_survive_the_erosion() {
         let map = fixture("kotka.gpkg");
         let polygons = map.geometries().filter(|geometry| is_polygonal(geometry)).count();
-        let eroded = Buffering::Erode { distance: 0.3 }.of(&map);
+        let eroded = Buffering::Erode { distance: 0.3 }.apply(&map);
         assert!(eroded.features().count() * 100 > polygons * 99);
         let area = |map: &Map| -> f64 { map.geometries().map(Area::unsigned_area).sum() };
         assert!(area(&eroded) < area(&map));

@@ -3,10 +3,10 @@
 use super::Map;
 use crate::Result;
 
-/// The mean of every coordinate over copies of one map.
+/// Returns the mean of every coordinate over copies of one map.
 ///
 /// # Errors
-/// No copies at all, or copies of different maps.
+/// Fails without copies, and on copies of different maps.
 pub fn average(copies: &[Map]) -> Result<Map> {
     let (first, others) = copies.split_first().ok_or("there is nothing to average")?;
     let others: Vec<Vec<[f64; 2]>> = others.iter().map(|copy| copy.coords().collect()).collect();

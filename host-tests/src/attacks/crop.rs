@@ -8,7 +8,7 @@ use gdal::{
 };
 use geo::{BoundingRect, Geometry, HasDimensions, Rect};
 
-/// What is cut out of the map's bounding box.
+/// A window in the map's bounding box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Window {
     /// The western half.
@@ -17,12 +17,12 @@ pub enum Window {
     TopHalf,
     /// One of four quarters; column 0 is west, row 0 is south.
     Quarter { column: usize, row: usize },
-    /// The middle, of the map's proportions, with this share of its area.
+    /// The middle, with the map's proportions and this share of its area.
     Centre { area_share: f64 },
 }
 
 impl Window {
-    /// The share of the map's area.
+    /// Returns the share of the map's area.
     pub fn area_share(self) -> f64 {
         match self {
             Window::LeftHalf | Window::TopHalf => 0.5,
@@ -52,7 +52,8 @@ impl Window {
 /// Cuts a window out of a map.
 ///
 /// # Errors
-/// Coordinates that are not finite; geometries that GEOS cannot cut even after a repair.
+/// Fails on coordinates that are not finite, and on geometries that GEOS cannot cut even after a
+/// repair.
 pub fn crop(map: &Map, window: Window) -> Result<Map> {
     let (min, max) = map.vertices()?.bounds();
     let window = window.within(min, max);
@@ -75,7 +76,7 @@ fn clip(geometry: &Geometry, window: Rect, mask: &vector::Geometry) -> Result<Op
     if apart(|c| c.x) || apart(|c| c.y) {
         return Ok(None);
     }
-    // A marked polygon may cross itself where it was a hair wide.
+    // A marked polygon may cross itself where it was very narrow.
     let mut subject = geometry.to_gdal()?;
     if !subject.is_valid() {
         subject = subject.make_valid(&CslStringList::new())?;
@@ -87,8 +88,8 @@ fn clip(geometry: &Geometry, window: Rect, mask: &vector::Geometry) -> Result<Op
     Ok(same_dimension(piece.to_geo()?, geometry))
 }
 
-/// Where a polygon only touches the border GEOS leaves a line or a point; no clipping tool keeps
-/// those.
+/// Returns a piece of the dimension of the original. Where a polygon only touches the border, GEOS
+/// leaves a line or a point, which no clipping tool keeps.
 fn same_dimension(piece: Geometry, original: &Geometry) -> Option<Geometry> {
     if piece.dimensions() != original.dimensions() {
         return None;

@@ -1,4 +1,4 @@
-//! Attacks that draw lines and rings anew: their course stays, their vertices do not.
+//! Attacks that draw lines and rings anew: they keep the course, but not the vertices.
 
 use super::{
     Map, Random,
@@ -6,25 +6,25 @@ use super::{
 };
 use geo::{ChaikinSmoothing, Coord};
 
-/// The distance along a curve after which the errors of a tracing hand have lost most of their
-/// likeness.
+/// The distance along a curve after which the errors of manual tracing lose most of their
+/// correlation.
 const HAND: f64 = 3.0;
 
-/// How lines and rings are drawn anew. Points stay.
+/// The way in which lines and rings are drawn anew. Points stay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Redrawing {
-    /// A vertex at every such distance along the curve, from a random place on, and none of the old
-    /// ones.
+    /// Vertices at this distance along the curve, from a random place on, in place of the old ones.
     Resample { spacing: f64 },
-    /// Resampled, and every new vertex off by Gaussian errors of this deviation, which are alike
-    /// along the curve over about [`HAND`]. Where a ring closes, its ends need not fit.
+    /// New vertices with Gaussian errors of this deviation, which are correlated along the curve
+    /// over about [`HAND`]. The ends of a ring need not meet.
     Trace { spacing: f64, deviation: f64 },
-    /// Corners cut at a quarter and three quarters of every edge (Chaikin 1974), so many times.
+    /// Corners cut at a quarter and three quarters of every edge (Chaikin 1974), this number of
+    /// times.
     Chaikin { rounds: usize },
 }
 
 impl Redrawing {
-    /// Draws every line and ring of a map anew, each by itself: shared walls part.
+    /// Draws every line and ring of a map anew, each by itself, so shared walls separate.
     pub fn draw(self, map: &Map, seed: u64) -> Map {
         match self {
             Redrawing::Resample { spacing } => resample(map, spacing, seed, |_, places| places),
@@ -52,7 +52,7 @@ fn resample(map: &Map, spacing: f64, seed: u64, draw: impl Fn(&mut Random, Vec<C
 /// Moves places on a curve by errors that follow one another as a first-order autoregression.
 fn by_hand(places: &[Coord], deviation: f64, random: &mut Random) -> Vec<Coord> {
     let mut error = [0.0; 2];
-    let mut likeness = 0.0; // to the error before
+    let mut likeness = 0.0; // to the preceding error
     let mut drawn = Vec::with_capacity(places.len());
     for (i, place) in places.iter().enumerate() {
         let fresh = (1.0f64 - likeness * likeness).sqrt() * deviation;
@@ -65,8 +65,8 @@ fn by_hand(places: &[Coord], deviation: f64, random: &mut Random) -> Vec<Coord> 
     drawn
 }
 
-/// Places along a line or ring, `spacing` apart; closer where it is too short for the fewest
-/// vertices it needs. The first is a share of the spacing away from the start.
+/// Returns places along a line or ring, `spacing` apart, or closer where it is too short for the
+/// fewest vertices it needs. The first is a share of the spacing away from the start.
 pub(super) fn walk(part: Part, run: &[Coord], spacing: f64, phase: f64) -> Vec<Coord> {
     let length = |(a, b): (Coord, Coord)| (b.x - a.x).hypot(b.y - a.y);
     let total: f64 = part.edges(run).map(length).sum();

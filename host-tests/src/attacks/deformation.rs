@@ -1,4 +1,4 @@
-//! Local deformation: the cells of a grid are turned a little, neighbours to opposite sides.
+//! Local deformation: the cells of a grid turn slightly, neighbours to opposite sides.
 
 use super::Map;
 use crate::Result;
@@ -8,11 +8,11 @@ use crate::Result;
 pub enum Cell {
     /// Width and height, units of the CRS.
     Size([f64; 2]),
-    /// So many columns and rows over the map's bounding box.
+    /// This number of columns and rows over the map's bounding box.
     Share(usize),
 }
 
-/// What decides to which side a vertex turns.
+/// The rule by which a vertex turns to one side or the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Side {
     /// Its cell's column + row: a checkerboard of turned cells.
@@ -25,7 +25,7 @@ pub enum Side {
 /// vertex's own coordinates) have an even sum, to the other when it is odd.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn deform(map: &Map, cell: Cell, degrees: f64, side: Side) -> Result<Map> {
     let (min, max) = map.vertices()?.bounds();
     let size = match cell {
@@ -47,7 +47,8 @@ pub fn deform(map: &Map, cell: Cell, degrees: f64, side: Side) -> Result<Map> {
     }))
 }
 
-/// The last cell takes the map's far edge in, when that is a cell's edge.
+/// Returns the index of a cell. The last cell includes the far edge of the map, if that is the edge
+/// of a cell.
 fn cell_index(offset: f64, size: f64, extent: f64) -> i64 {
     let last = ((extent / size).ceil() as i64 - 1).max(0);
     ((offset / size).floor() as i64).min(last)

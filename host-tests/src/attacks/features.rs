@@ -19,7 +19,7 @@ pub fn delete(map: &Map, share: f64, seed: u64) -> Map {
 /// feature id.
 ///
 /// # Errors
-/// A feature that the unmarked map does not have.
+/// Fails on a feature that the unmarked map does not have.
 pub fn exchange(map: &Map, unmarked: &Map, share: f64, seed: u64) -> Result<Map> {
     let mut exchanged = Random::new(seed).share(map.features().count(), share).into_iter();
     let mut map = map.clone();
@@ -42,8 +42,8 @@ pub fn exchange(map: &Map, unmarked: &Map, share: f64, seed: u64) -> Result<Map>
     Ok(map)
 }
 
-/// Puts layers and features in random order and takes their ids away, for by id they would be
-/// sorted again.
+/// Puts layers and features in random order and removes their ids, by which they could be sorted
+/// again.
 pub fn scramble(map: &Map, seed: u64) -> Map {
     let mut random = Random::new(seed);
     let mut map = map.clone();
@@ -55,7 +55,7 @@ pub fn scramble(map: &Map, seed: u64) -> Map {
     map
 }
 
-/// Takes all attributes away.
+/// Removes all attributes.
 pub fn drop_attributes(map: &Map) -> Map {
     let mut map = map.clone();
     for layer in &mut map.layers {
@@ -68,7 +68,7 @@ pub fn drop_attributes(map: &Map) -> Map {
 /// Lays another map over this one, centre on centre, in layers of its own.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn merge(map: &Map, foreign: &Map) -> Result<Map> {
     let (here, there) = (map.vertices()?.centre(), foreign.vertices()?.centre());
     let foreign = similarity::translate(foreign, [here[0] - there[0], here[1] - there[1]]);

@@ -1,4 +1,4 @@
-//! Round trips through the formats in which maps travel, by `ogr2ogr` as anyone would do it.
+//! Round trips through exchange formats by `ogr2ogr`.
 
 use super::{Layer, Map};
 use crate::Result;
@@ -7,7 +7,7 @@ use std::{path::Path, process::Command};
 /// An exchange format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Names of ten characters, one geometry type a file.
+    /// Shapefile: names of ten characters, one geometry type per file.
     Shapefile,
     /// RFC 7946: degrees with 7 decimals.
     GeoJson,
@@ -18,7 +18,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The name people know it by.
+    /// Returns the usual name.
     pub fn name(self) -> &'static str {
         match self {
             Format::Shapefile => "Shapefile",
@@ -28,7 +28,8 @@ impl Format {
         }
     }
 
-    /// GDAL's driver, the file's extension and the options that make it the standard's.
+    /// Returns GDAL's driver, the file's extension and the options for a file according to the
+    /// standard.
     fn gdal(self) -> (&'static str, &'static str, &'static [&'static str]) {
         match self {
             Format::Shapefile => ("ESRI Shapefile", "shp", &["-lco", "ENCODING=UTF-8"]),
@@ -42,7 +43,7 @@ impl Format {
 /// Writes every layer to a file of its own and reads it back.
 ///
 /// # Errors
-/// What ogr2ogr prints; no room for temporary files.
+/// Fails with the output of `ogr2ogr`, and when temporary files cannot be written.
 pub fn round_trip(map: &Map, format: Format) -> Result<Map> {
     let folder = tempfile::tempdir()?;
     let source = folder.path().join("source.gpkg");

@@ -1,5 +1,5 @@
-//! A map in memory, which attacks take and give: layers, attributes and feature ids of any GDAL
-//! dataset, geometries in the plane (Z and M are left behind).
+//! A map in memory, the input and output of attacks: layers, attributes and feature ids of any GDAL
+//! dataset, geometries in the plane (without Z and M).
 
 use crate::Result;
 use gdal::{
@@ -52,7 +52,8 @@ impl Map {
     /// Reads all layers of a dataset.
     ///
     /// # Errors
-    /// What GDAL says; curves and surfaces, which the plane geometries here cannot hold.
+    /// Fails with the message of GDAL, and on curves and surfaces, which plane geometries cannot
+    /// hold.
     pub fn read(path: &Path) -> Result<Map> {
         let failed = |error: Box<dyn std::error::Error + Send + Sync>| format!("{}: {error}", path.display());
         let dataset = Dataset::open(path).map_err(|error| failed(error.into()))?;
@@ -63,7 +64,7 @@ impl Map {
     /// Writes a GeoPackage, with its feature ids.
     ///
     /// # Errors
-    /// What GDAL says.
+    /// Fails with the message of GDAL.
     pub fn write(&self, path: &Path) -> Result<()> {
         let driver = DriverManager::get_driver_by_name("GPKG")?;
         let mut dataset = driver.create_vector_only(path)?;
@@ -76,30 +77,30 @@ impl Map {
         Ok(())
     }
 
-    /// All features.
+    /// Returns all features.
     pub fn features(&self) -> impl Iterator<Item = &Feature> {
         self.layers.iter().flat_map(|layer| &layer.features)
     }
 
-    /// All geometries that there are.
+    /// Returns all geometries that there are.
     pub fn geometries(&self) -> impl Iterator<Item = &Geometry> {
         self.features().filter_map(|feature| feature.geometry.as_ref())
     }
 
-    /// Every coordinate of every geometry, in the order of the file.
+    /// Returns every coordinate of every geometry, in the order of the file.
     pub fn coords(&self) -> impl Iterator<Item = [f64; 2]> {
         self.geometries().flat_map(coords)
     }
 
-    /// The distinct vertices.
+    /// Returns the distinct vertices.
     ///
     /// # Errors
-    /// Coordinates that are not finite.
+    /// Fails on coordinates that are not finite.
     pub fn vertices(&self) -> Result<VertexTable> {
         Ok(VertexTable::new(self.coords().collect())?)
     }
 
-    /// The same map with every coordinate, in the order of [`Map::coords`], moved by `f`.
+    /// Returns the same map with every coordinate, in the order of [`Map::coords`], moved by `f`.
     pub fn map_coords(&self, f: impl FnMut([f64; 2]) -> [f64; 2]) -> Map {
         let f = RefCell::new(f); // geo wants a function without a state
         let moved = |c: Coord| Coord::from((f.borrow_mut())([c.x, c.y]));
@@ -110,7 +111,7 @@ impl Map {
         map
     }
 
-    /// The same map with layers that hold geometries of all types.
+    /// Returns the same map with layers that hold geometries of all types.
     pub fn of_any_type(mut self) -> Map {
         for layer in &mut self.layers {
             layer.geometry_type = OGRwkbGeometryType::wkbUnknown;
@@ -118,17 +119,17 @@ impl Map {
         self
     }
 
-    /// The same map with every geometry replaced; a feature whose geometry becomes `None` goes with
-    /// it.
+    /// Returns the same map with every geometry replaced; a feature whose geometry becomes `None`
+    /// is dropped.
     pub fn map_geometries(&self, mut f: impl FnMut(&Geometry) -> Option<Geometry>) -> Map {
         let Ok(map) = self.try_map_geometries::<Infallible>(|geometry| Ok(f(geometry)));
         map
     }
 
-    /// [`Map::map_geometries`] with an `f` that may fail.
+    /// Replaces geometries like [`Map::map_geometries`] with an `f` that may fail.
     ///
     /// # Errors
-    /// The first of `f`.
+    /// Returns the first error of `f`.
     pub fn try_map_geometries<E>(
         &self,
         mut f: impl FnMut(&Geometry) -> std::result::Result<Option<Geometry>, E>,
@@ -149,7 +150,7 @@ impl Map {
     }
 }
 
-/// Every coordinate of a geometry; the end of a ring again.
+/// Returns every coordinate of a geometry, the first one of a ring also at its end.
 pub fn coords(geometry: &Geometry) -> impl Iterator<Item = [f64; 2]> {
     geometry.coords_iter().map(|c| [c.x, c.y])
 }
@@ -168,7 +169,7 @@ fn read_layer(layer: &mut vector::Layer) -> Result<Layer> {
     Ok(Layer { name, crs, geometry_type, fields, features })
 }
 
-/// The kinds the bindings read as they are; the others are read as texts.
+/// Returns the kind itself where the bindings read it, otherwise that of texts.
 fn readable(kind: OGRFieldType::Type) -> OGRFieldType::Type {
     match kind {
         OGRFieldType::OFTTime | OGRFieldType::OFTBinary => OGRFieldType::OFTString,
@@ -179,7 +180,7 @@ fn readable(kind: OGRFieldType::Type) -> OGRFieldType::Type {
 fn read_feature(feature: &vector::Feature, fields: &[Field]) -> Result<Feature> {
     let value = |(i, field): (usize, &Field)| match field.kind {
         OGRFieldType::OFTString => Ok(feature.field_as_string(i)?.map(FieldValue::StringValue)),
-        // A date that was never set, as KML has them, is an error to the bindings.
+        // The bindings fail on dates that were never set, which KML has.
         OGRFieldType::OFTDate | OGRFieldType::OFTDateTime => Ok(feature.field(i).unwrap_or(None)),
         _ => Ok(feature.field(i)?),
     };

@@ -1,8 +1,7 @@
-//! Attacks on marked maps: those of Table 2 of the paper, and what else happens to maps, by malice
-//! or not.
+//! Attacks on marked maps: those of Table 2 of the paper, and other changes, malicious or not.
 //!
 //! An attack is a pure function from a map (and a seed) to a map. Layers, attributes, feature ids
-//! and the CRS stay as they are where the attack is not about them. Where it concerns vertices, a
+//! and the CRS stay unchanged where the attack does not concern them. Where it concerns vertices, a
 //! vertex that several features share is one vertex.
 
 pub mod bodies;
@@ -44,6 +43,7 @@ use outlines::Outline;
 use quantisation::Quantisation;
 use similarity::{About, Matrix};
 use std::sync::Arc;
+use vertices::Simplification;
 
 /// An attack, all lengths in units of the map's CRS.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,10 +115,10 @@ pub enum Attack {
 }
 
 impl Attack {
-    /// What the attack makes of a map.
+    /// Applies the attack to a map.
     ///
     /// # Errors
-    /// Coordinates that are not finite; GDAL, PROJ and GEOS.
+    /// Fails on coordinates that are not finite, and with the messages of GDAL, PROJ and GEOS.
     pub fn apply(&self, map: &Map, seed: u64) -> Result<Map> {
         match self {
             Attack::Translate(by) => Ok(similarity::translate(map, *by)),
@@ -136,10 +136,12 @@ impl Attack {
             Attack::InsertVertices { count } => vertices::insert(map, *count, seed),
             Attack::Densify { spacing } => Ok(vertices::densify(map, *spacing)),
             Attack::DrawAnew(redrawing) => Ok(redrawing.draw(map, seed)),
-            Attack::Outline(outline) => Ok(outline.of(map)),
-            Attack::Simplify { tolerance } => Ok(vertices::simplify(map, *tolerance)),
-            Attack::SimplifyByArea { area } => Ok(vertices::simplify_by_area(map, *area)),
-            Attack::Buffer(buffering) => Ok(buffering.of(map)),
+            Attack::Outline(outline) => Ok(outline.apply(map)),
+            Attack::Simplify { tolerance } => {
+                Ok(vertices::simplify(map, Simplification::Distance(*tolerance)))
+            }
+            Attack::SimplifyByArea { area } => Ok(vertices::simplify(map, Simplification::Area(*area))),
+            Attack::Buffer(buffering) => Ok(buffering.apply(map)),
             Attack::Vectorise { pixel } => rasters::vectorise(map, *pixel),
             Attack::Dissolve => Ok(topology::dissolve(map)),
             Attack::Planarise => topology::planarise(map),
@@ -161,8 +163,7 @@ impl Attack {
         }
     }
 
-    /// How strong it is, for attacks that come in strengths: the number that names it, in its own
-    /// unit.
+    /// Returns the strength of an attack that has one: the number that names it, in its own unit.
     pub fn strength(&self) -> Option<f64> {
         match self {
             Attack::Snap { spacing } | Attack::Densify { spacing } => Some(*spacing),
@@ -182,12 +183,12 @@ pub(crate) mod tests {
     use gdal::vector::{FieldValue, Geometry, OGRFieldType, OGRwkbGeometryType, ToGdal};
     use std::collections::HashMap;
 
-    /// One of the repository's small maps.
+    /// Returns one of the repository's small maps.
     pub fn fixture(name: &str) -> Map {
         Map::read(&plugin::fixture(name)).unwrap()
     }
 
-    /// A map of one layer with these geometries, named a, b, …
+    /// Returns a map of one layer with these geometries, named a, b, …
     pub fn in_memory(wkt: &[&str]) -> Map {
         let feature = |(i, wkt): (usize, &&str)| Feature {
             fid: Some(i as u64 + 1),
@@ -204,18 +205,18 @@ pub(crate) mod tests {
         Map { layers: vec![layer] }
     }
 
-    /// The geometries of a map.
+    /// Returns the geometries of a map.
     pub fn wkt(map: &Map) -> Vec<String> {
         map.geometries().map(|geometry| geometry.to_gdal().unwrap().wkt().unwrap()).collect()
     }
 
-    /// Places of vertices before and after.
+    /// Returns the places of vertices before and after.
     pub fn pairs(before: &Map, after: &Map) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
         assert_eq!(before.coords().count(), after.coords().count());
         before.coords().zip(after.coords())
     }
 
-    /// Fails when two occurrences of one vertex end in different places.
+    /// Asserts that all occurrences of a vertex move to one place.
     pub fn assert_shared_vertices_stay_shared(before: &Map, after: &Map) {
         let mut places = HashMap::new();
         for (from, to) in pairs(before, after) {

@@ -4,10 +4,10 @@ use super::{Map, Random, random::PerVertex};
 use crate::Result;
 use geo::{Coord, Geometry, MapCoords};
 
-/// Adds a number that `draw` makes to either coordinate of every vertex, units of the CRS.
+/// Adds a number from `draw` to both coordinates of every vertex, units of the CRS.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn add(map: &Map, seed: u64, draw: impl Fn(&mut Random) -> f64) -> Result<Map> {
     let noise = PerVertex::draw(map, seed, |random| [draw(random), draw(random)])?;
     Ok(map.map_coords(|vertex| {
@@ -16,11 +16,11 @@ pub fn add(map: &Map, seed: u64, draw: impl Fn(&mut Random) -> f64) -> Result<Ma
     }))
 }
 
-/// Adds Gaussian noise to the vertices of a share of the features; a vertex they share with others
-/// parts there.
+/// Adds Gaussian noise to the vertices of a share of the features, so vertices that they share with
+/// others separate.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn redraw(map: &Map, share: f64, deviation: f64, seed: u64) -> Result<Map> {
     let mut random = Random::new(seed);
     let noise = PerVertex::draw(map, random.seed(), |random| [(); 2].map(|()| deviation * random.normal()))?;
@@ -41,8 +41,7 @@ pub fn redraw(map: &Map, share: f64, deviation: f64, seed: u64) -> Result<Map> {
 
 /// Puts every vertex on the nearest node of a grid through the origin.
 pub fn snap(map: &Map, spacing: f64) -> Map {
-    // Nodes of a spacing such as 0.1 are k / 10, the numbers that print as one decimal; k × 0.1 are
-    // not.
+    // Nodes with a spacing such as 0.1 are k / 10, which prints as one decimal, unlike k × 0.1.
     let per_unit = 1.0 / spacing;
     let whole = (per_unit - per_unit.round()).abs() < 1e-9;
     let node = |value: f64| match whole {

@@ -1,23 +1,22 @@
-//! Attacks that leave of every polygon something simpler that stands for it, and nothing else of
-//! the map.
+//! Attacks that replace every polygon by a simpler geometry, and drop the rest of the map.
 
 use super::{Map, parts::is_polygonal};
 use geo::{BoundingRect, Centroid, Geometry, MinimumRotatedRect};
 
-/// What stands for a polygon.
+/// The geometry that replaces a polygon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outline {
     /// Its centroid.
     Centroid,
     /// Its extent along the axes.
     BoundingBox,
-    /// The rectangle of the smallest area around it.
+    /// The rectangle with the smallest area around it.
     MinimumRectangle,
 }
 
 impl Outline {
-    /// What is left of a map: features of polygons as their outlines.
-    pub fn of(self, map: &Map) -> Map {
+    /// Returns the features of polygons as their outlines.
+    pub fn apply(self, map: &Map) -> Map {
         map.map_geometries(|geometry| self.of_polygon(geometry)).of_any_type()
     }
 
@@ -44,9 +43,9 @@ mod tests {
     #[test]
     fn polygons_alone_are_left_as_their_outlines() {
         let map = in_memory(&[DIAMOND, "LINESTRING (0 0,9 9)", "POINT (1 1)"]);
-        assert_eq!(wkt(&Outline::Centroid.of(&map)), ["POINT (2 2)"]);
-        assert_eq!(wkt(&Outline::BoundingBox.of(&map)), ["POLYGON ((4 0,4 4,0 4,0 0,4 0))"]);
-        let rectangle = Outline::MinimumRectangle.of(&map);
+        assert_eq!(wkt(&Outline::Centroid.apply(&map)), ["POINT (2 2)"]);
+        assert_eq!(wkt(&Outline::BoundingBox.apply(&map)), ["POLYGON ((4 0,4 4,0 4,0 0,4 0))"]);
+        let rectangle = Outline::MinimumRectangle.apply(&map);
         let area: f64 = rectangle.geometries().map(Area::unsigned_area).sum();
         assert!((area - 8.0).abs() < 1e-9, "the diamond is its own rectangle: {area}");
     }

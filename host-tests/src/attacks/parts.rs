@@ -6,7 +6,7 @@ use geo::{
     Polygon,
 };
 
-/// What a run of vertices is.
+/// The kind of a run of vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// One vertex.
@@ -18,7 +18,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// The fewest vertices it can have.
+    /// Returns the fewest vertices it can have.
     pub fn least(self) -> usize {
         match self {
             Part::Point => 1,
@@ -27,18 +27,18 @@ impl Part {
         }
     }
 
-    /// The edges of a run of vertices.
+    /// Returns the edges of a run of vertices.
     pub fn edges(self, run: &[Coord]) -> impl Iterator<Item = (Coord, Coord)> {
         let closing = (self == Part::Ring).then(|| (run[run.len() - 1], run[0]));
         run.windows(2).map(|pair| (pair[0], pair[1])).chain(closing)
     }
 }
 
-/// What takes the place of a run of vertices. Too few for the part and it is dropped.
+/// A function that returns the vertices in place of a run; with too few for a part, it is dropped.
 pub type Rewrite<'a> = &'a mut dyn FnMut(Part, &[Coord]) -> Vec<Coord>;
 
-/// Rewrites every part of a geometry. A polygon goes with its outer ring, a geometry with its last
-/// part.
+/// Rewrites every part of a geometry. A polygon is dropped with its outer ring, a geometry with its
+/// last part.
 pub fn rewrite(geometry: &Geometry, f: Rewrite) -> Option<Geometry> {
     match geometry {
         Geometry::Point(p) => point(p, f).map(Geometry::Point),
@@ -74,12 +74,12 @@ pub fn visit(geometry: &Geometry, mut f: impl FnMut(Part, &[Coord])) {
     });
 }
 
-/// [`rewrite`] for a whole map.
+/// Rewrites every part of a whole map like [`rewrite`].
 pub fn rewrite_map(map: &Map, f: Rewrite) -> Map {
     map.map_geometries(|geometry| rewrite(geometry, f))
 }
 
-/// Whether a geometry is a polygon or several.
+/// Returns whether a geometry is a polygon or several.
 pub fn is_polygonal(geometry: &Geometry) -> bool {
     matches!(geometry, Geometry::Polygon(_) | Geometry::MultiPolygon(_))
 }

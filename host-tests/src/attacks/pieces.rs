@@ -5,12 +5,12 @@ use crate::Result;
 use geo::Geometry;
 use std::collections::HashSet;
 
-/// Keeps the features that lie in a circle around a random vertex, which grows until they have so
-/// many distinct vertices. A feature that would exceed the count is passed over; the piece is
+/// Keeps the features in a circle around a random vertex, which grows until they have this number
+/// of distinct vertices. Features that would exceed the number are passed over; the piece is
 /// complete at nine tenths of it.
 ///
 /// # Errors
-/// A map without vertices.
+/// Fails on a map without vertices.
 pub fn cut(map: &Map, vertices: usize, seed: u64) -> Result<Map> {
     let table = map.vertices()?;
     if table.is_empty() {
@@ -43,7 +43,7 @@ pub fn cut(map: &Map, vertices: usize, seed: u64) -> Result<Map> {
     Ok(piece)
 }
 
-/// Of the circle around a place that holds a geometry.
+/// Returns the radius of the circle around a place that holds a geometry.
 fn radius(geometry: &Geometry, place: [f64; 2]) -> f64 {
     coords(geometry).map(|[x, y]| (x - place[0]).hypot(y - place[1])).fold(0.0, f64::max)
 }

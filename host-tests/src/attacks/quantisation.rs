@@ -1,5 +1,4 @@
-//! Attacks by formats that have coordinates on a grid: vector tiles, TopoJSON, drawings for the
-//! screen.
+//! Attacks by formats with coordinates on a grid: vector tiles, TopoJSON, drawings for the screen.
 
 use super::{
     Map,
@@ -19,29 +18,30 @@ const TOPOJSON_POINTS: f64 = 1e4;
 /// Decimals in a drawing.
 const SVG_DECIMALS: i32 = 2;
 
-/// The grid of a format. Repeated points go, and parts that have become too small.
+/// The grid of a format. Repeated points are dropped, and parts that become too small.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantisation {
-    /// Of vector tiles at a zoom level, in EPSG:3857. Lines are not cut at the borders of tiles.
+    /// The grid of vector tiles at a zoom level, in EPSG:3857. The borders of tiles do not cut
+    /// lines.
     VectorTiles { zoom: i32 },
     /// Ten thousand points over the extent, in the map's CRS.
     TopoJson,
-    /// A drawing so many pixels wide, with two decimals and y downwards, without CRS and
+    /// A drawing with this width in pixels, with two decimals and y downwards, without CRS and
     /// attributes.
     Svg { width: f64 },
 }
 
 impl Quantisation {
-    /// The map on the grid.
+    /// Puts the map on the grid.
     ///
     /// # Errors
-    /// Coordinates that are not finite; what PROJ says.
+    /// Fails on coordinates that are not finite, and with the message of PROJ.
     pub fn apply(self, map: &Map) -> Result<Map> {
         let (min, max) = map.vertices()?.bounds();
         let extent = [0, 1].map(|axis| max[axis] - min[axis]);
         match self {
             Quantisation::VectorTiles { zoom } => {
-                // The corner of the tiles is a point of the grid through the origin, too.
+                // The corner of the tiles is also a point of the grid through the origin.
                 let unit = WORLD / 2f64.powi(zoom) / TILE_UNITS;
                 Ok(on_grid(&reproject(map, 3857, None)?, [0.0; 2], [unit; 2]))
             }

@@ -12,33 +12,34 @@ use rand_chacha::{
 pub struct Random(ChaCha20Rng);
 
 impl Random {
-    /// The stream of a seed.
+    /// Creates the stream of a seed.
     pub fn new(seed: u64) -> Self {
         Random(ChaCha20Rng::seed_from_u64(seed))
     }
 
-    /// The seed of another stream.
+    /// Returns the seed of another stream.
     pub fn seed(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// Uniform in [0, 1).
+    /// Returns a number uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform in [−half_width, half_width).
+    /// Returns a number uniform in [−half_width, half_width).
     pub fn symmetric(&mut self, half_width: f64) -> f64 {
         (2.0 * self.unit() - 1.0) * half_width
     }
 
-    /// Standard normal (Box and Muller 1958).
+    /// Returns a standard normal number (Box and Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let (radius, turn) = (-2.0 * (1.0 - self.unit()).ln(), std::f64::consts::TAU * self.unit());
         radius.sqrt() * turn.cos()
     }
 
-    /// Uniform in 0 … count − 1; `count` is far below 2⁶⁴, so the remainder is as good as uniform.
+    /// Returns an integer uniform in 0 … count − 1; `count` is far below 2⁶⁴, so the remainder is
+    /// practically uniform.
     pub fn below(&mut self, count: usize) -> usize {
         (self.0.next_u64() % count as u64) as usize
     }
@@ -50,14 +51,14 @@ impl Random {
         }
     }
 
-    /// Which of `count` things are among `chosen` of them.
+    /// Returns which of `count` things are among `chosen` of them.
     pub fn choice(&mut self, count: usize, chosen: usize) -> Vec<bool> {
         let mut choice: Vec<bool> = (0..count).map(|i| i < chosen).collect();
         self.shuffle(&mut choice);
         choice
     }
 
-    /// Which of `count` things are among a share of them.
+    /// Returns which of `count` things are among a share of them.
     pub fn share(&mut self, count: usize, share: f64) -> Vec<bool> {
         self.choice(count, (share * count as f64).round() as usize)
     }
@@ -71,10 +72,10 @@ pub struct PerVertex<T> {
 }
 
 impl<T: Copy> PerVertex<T> {
-    /// Draws them.
+    /// Draws the values.
     ///
     /// # Errors
-    /// Coordinates that are not finite.
+    /// Fails on coordinates that are not finite.
     pub fn draw(map: &Map, seed: u64, draw: impl Fn(&mut Random) -> T) -> Result<Self> {
         let table = map.vertices()?;
         let mut random = Random::new(seed);
@@ -82,7 +83,7 @@ impl<T: Copy> PerVertex<T> {
         Ok(PerVertex { table, values })
     }
 
-    /// The value of a vertex of that map.
+    /// Returns the value of a vertex of that map.
     pub fn at(&self, vertex: [f64; 2]) -> T {
         self.values[self.table.index_of(vertex).expect("a vertex of the map the values were drawn for")]
     }

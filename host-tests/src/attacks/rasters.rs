@@ -1,4 +1,4 @@
-//! An attack by way of pixels: polygons are burnt into a raster, and their outlines traced from it.
+//! An attack through pixels: polygons are rasterised, and their outlines traced from the raster.
 
 use super::{
     Map,
@@ -15,11 +15,11 @@ use geo::{BoundingRect, Coord, Geometry, LineString, Polygon, Rect, Simplify, un
 /// along a straight wall, so less would leave stairs.
 const SMOOTHING_PIXELS: f64 = 1.0;
 
-/// Polygons as they come back from a raster with pixels of this size, units of the CRS, each from a
-/// band of its own; nothing else of the map is left, and no attributes.
+/// Returns polygons as traced from a raster with pixels of this size, units of the CRS, each from
+/// its own band. The rest of the map and the attributes are dropped.
 ///
 /// # Errors
-/// What GDAL says.
+/// Fails with the message of GDAL.
 pub fn vectorise(map: &Map, pixel: f64) -> Result<Map> {
     let mut map = drop_attributes(map).try_map_geometries(|geometry| traced(geometry, pixel))?.of_any_type();
     map.layers.iter_mut().flat_map(|layer| &mut layer.features).for_each(|feature| feature.fid = None);
@@ -35,8 +35,8 @@ fn traced(geometry: &Geometry, pixel: f64) -> Result<Option<Geometry>> {
     Ok(rewrite(&stairs, &mut |_, run| between_the_stairs(run, pixel)))
 }
 
-/// A straight outline for one of stairs: the middles of its pixels' edges, simplified. Tracers such
-/// as potrace do much the same, but draw curves.
+/// Straightens an outline of stairs: it simplifies the middles of the pixels' edges. Tracers such
+/// as potrace do nearly the same, but draw curves.
 fn between_the_stairs(run: &[Coord], pixel: f64) -> Vec<Coord> {
     let mut middles = walk(Part::Ring, run, pixel, 0.5);
     middles.push(middles[0]);
@@ -45,8 +45,8 @@ fn between_the_stairs(run: &[Coord], pixel: f64) -> Vec<Coord> {
     outline
 }
 
-/// The pixels whose centres a geometry covers, on a grid through the origin: each run of a row as a
-/// rectangle.
+/// Returns the pixels whose centres a geometry covers, on a grid through the origin, each run of a
+/// row as a rectangle.
 fn runs_of_pixels(geometry: &Geometry, pixel: f64) -> Result<Vec<Polygon>> {
     let Some(bounds) = geometry.bounding_rect() else { return Ok(Vec::new()) };
     let west = (bounds.min().x / pixel).floor();

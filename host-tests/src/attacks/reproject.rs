@@ -9,7 +9,7 @@ use std::cell::Cell;
 /// Brings a map into an EPSG CRS; `decimals` rounds its coordinates.
 ///
 /// # Errors
-/// A layer without a CRS, and what PROJ says.
+/// Fails on a layer without a CRS, and with the message of PROJ.
 pub fn reproject(map: &Map, epsg: u32, decimals: Option<u32>) -> Result<Map> {
     let target = east_north(SpatialRef::from_epsg(epsg)?);
     let scale = decimals.map(|decimals| 10f64.powi(decimals as i32));

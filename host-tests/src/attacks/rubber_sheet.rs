@@ -1,4 +1,4 @@
-//! Smooth deformation of a whole map, as of paper that has been wet or of a georeferenced scan.
+//! Smooth deformation of a whole map, like that of wet paper or of a georeferenced scan.
 
 use super::{Map, Random};
 use crate::Result;
@@ -35,7 +35,7 @@ impl Wave {
 /// moves further.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn bend(map: &Map, amplitude: f64, seed: u64) -> Result<Map> {
     let mut random = Random::new(seed);
     let mut waves = || [(); WAVES].map(|()| Wave::draw(&mut random, amplitude / WAVES as f64));

@@ -3,7 +3,7 @@
 use super::Map;
 use crate::Result;
 
-/// Where an affine map has its fixed point.
+/// The fixed point of an affine map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum About {
     /// The lower left corner of the map's bounding box.
@@ -18,7 +18,7 @@ pub type Matrix = [[f64; 2]; 2];
 /// Multiplies coordinates, relative to a place of the map, by a matrix.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn linear(map: &Map, [row_x, row_y]: Matrix, about: About) -> Result<Map> {
     let vertices = map.vertices()?;
     let [x0, y0] = match about {
@@ -36,23 +36,23 @@ pub fn translate(map: &Map, by: [f64; 2]) -> Map {
     map.map_coords(|[x, y]| [x + by[0], y + by[1]])
 }
 
-/// Different factors for x and y.
+/// Returns the matrix with different factors for x and y.
 pub fn scaling(x: f64, y: f64) -> Matrix {
     [[x, 0.0], [0.0, y]]
 }
 
-/// Anticlockwise.
+/// Returns an anticlockwise rotation.
 pub fn rotation(degrees: f64) -> Matrix {
     let (sin, cos) = degrees.to_radians().sin_cos();
     [[cos, -sin], [sin, cos]]
 }
 
-/// x grows by `share` of y.
+/// Returns the shear in which x grows by `share` of y.
 pub fn shear(share: f64) -> Matrix {
     [[1.0, share], [0.0, 1.0]]
 }
 
-/// East becomes west.
+/// Returns the matrix by which east becomes west.
 pub fn mirror() -> Matrix {
     scaling(-1.0, 1.0)
 }

@@ -1,8 +1,8 @@
-//! Squaring: almost right angles of polygons are made right, as editors offer for buildings.
+//! Squaring: almost right angles of polygons become right ones, as editors offer for buildings.
 //!
-//! The method is the one of iD, the OpenStreetMap editor: a corner moves along its bisector until
-//! it is square, in small steps, all corners at once. Vertices that polygons share move by the mean
-//! of the moves of their corners, so walls stay shared.
+//! The method is that of iD, the OpenStreetMap editor: a corner moves along its bisector until it
+//! is square, in small steps, all corners at once. Vertices that polygons share move by the mean of
+//! the moves of their corners, so walls stay shared.
 
 use super::{
     Map,
@@ -13,7 +13,7 @@ use geo::{Coord, Geometry};
 use meshmark_core::vertices::VertexTable;
 
 const STEPS: usize = 300;
-/// The share of a correction that is done in a step.
+/// The share of a correction that a step makes.
 const SHARE: f64 = 0.1;
 
 /// A corner: a vertex and its two neighbours on a ring, as vertex numbers.
@@ -25,7 +25,7 @@ struct Corner {
 /// Squares the corners of all polygons that are within `tolerance_degrees` of a right angle.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn square(map: &Map, tolerance_degrees: f64) -> Result<Map> {
     let table = map.vertices()?;
     let centre = table.centre();
@@ -68,7 +68,7 @@ fn corners(map: &Map, table: &VertexTable) -> Vec<Corner> {
     corners
 }
 
-/// Unit vectors along the two sides of a corner, and the shorter length.
+/// Returns unit vectors along the two sides of a corner, and the shorter length.
 fn sides(corner: &Corner, places: &[[f64; 2]]) -> Option<([[f64; 2]; 2], f64)> {
     let at = places[corner.at];
     let vectors = corner.sides.map(|side| [places[side][0] - at[0], places[side][1] - at[1]]);

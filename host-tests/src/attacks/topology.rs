@@ -1,4 +1,4 @@
-//! Attacks on what belongs together: areas dissolved, lines cut at every crossing.
+//! Attacks on topology: areas are dissolved, lines cut at every crossing.
 
 use super::{
     Feature, Layer, Map,
@@ -9,8 +9,7 @@ use crate::Result;
 use gdal::vector::ToGdal;
 use geo::{Geometry, LineString, MultiLineString, MultiPolygon, Orient, orient::Direction, unary_union};
 
-/// Joins the polygons of every layer where they meet; what is joined has no attributes, so none are
-/// left.
+/// Joins the polygons of every layer where they meet, and drops all attributes.
 pub fn dissolve(map: &Map) -> Map {
     let mut map = drop_attributes(map).of_any_type();
     for layer in &mut map.layers {
@@ -23,11 +22,11 @@ pub fn dissolve(map: &Map) -> Map {
     map
 }
 
-/// Cuts all lines and outlines at all their crossings and keeps what lies twice once: one layer of
-/// lines, without attributes.
+/// Cuts all lines and outlines at all their crossings and keeps each piece once, in one layer of
+/// lines without attributes.
 ///
 /// # Errors
-/// What GEOS says of the lines.
+/// Fails with the message of GEOS.
 pub fn planarise(map: &Map) -> Result<Map> {
     let mut lines = Vec::new();
     for geometry in map.geometries() {
@@ -54,7 +53,7 @@ fn nameless(geometry: Geometry) -> Feature {
     Feature { fid: None, values: Vec::new(), geometry: Some(geometry) }
 }
 
-/// Polygons with their rings in the directions that the union wants.
+/// Returns polygons with their rings in the directions that the union requires.
 fn oriented(geometry: Geometry) -> Option<MultiPolygon> {
     let polygons = match geometry {
         Geometry::Polygon(polygon) => MultiPolygon(vec![polygon]),

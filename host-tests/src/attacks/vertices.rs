@@ -9,12 +9,13 @@ use crate::Result;
 use geo::{Coord, Geometry, Simplify, SimplifyVw};
 use std::collections::{BTreeSet, HashMap};
 
-/// An edge without a direction: smaller end first, so that all features that share it agree on it.
+/// An edge without a direction: the smaller end comes first, so that all features that share the
+/// edge agree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Edge([[u64; 2]; 2]);
 
 impl Edge {
-    /// The edge, and whether it was given from its larger end. `None` between equal ends.
+    /// Returns the edge and whether its larger end comes first; `None` between equal ends.
     fn new(a: Coord, b: Coord) -> Option<(Edge, bool)> {
         let bits = |c: Coord| [c.x.to_bits(), c.y.to_bits()];
         match bits(a).cmp(&bits(b)) {
@@ -37,7 +38,7 @@ impl Edge {
 /// Inserts vertices at random places of random edges, in every feature that has the edge.
 ///
 /// # Errors
-/// A map of points only.
+/// Fails on a map of points alone.
 pub fn insert(map: &Map, count: usize, seed: u64) -> Result<Map> {
     let edges: Vec<Edge> = edges(map).into_iter().collect();
     if edges.is_empty() {
@@ -83,7 +84,7 @@ fn subdivide(map: &Map, shares: impl Fn(Edge) -> Vec<f64>) -> Map {
             divided.push(b);
         }
         if part == Part::Ring {
-            divided.pop(); // the closing edge came back to the start
+            divided.pop(); // the closing edge ends at the start
         }
         divided
     })
@@ -101,39 +102,44 @@ fn edges(map: &Map) -> BTreeSet<Edge> {
     edges
 }
 
-/// Simplifies every line and ring by itself (Douglas and Peucker 1973), as `ogr2ogr -simplify`
-/// does.
-pub fn simplify(map: &Map, tolerance: f64) -> Map {
+/// The vertices that a simplification removes.
+#[derive(Debug, Clone, Copy)]
+pub enum Simplification {
+    /// Vertices within this tolerance of the simplified line (Douglas and Peucker 1973), as
+    /// `ogr2ogr -simplify` does.
+    Distance(f64),
+    /// Vertices that span triangles under this area with their neighbours, smallest first
+    /// (Visvalingam and Whyatt 1993).
+    Area(f64),
+}
+
+impl Simplification {
+    fn apply<G: Simplify<f64> + SimplifyVw<f64>>(self, geometry: &G) -> G {
+        match self {
+            Simplification::Distance(tolerance) => geometry.simplify(tolerance),
+            Simplification::Area(area) => geometry.simplify_vw(area),
+        }
+    }
+}
+
+/// Simplifies every line and ring by itself.
+pub fn simplify(map: &Map, how: Simplification) -> Map {
     map.map_geometries(|geometry| {
         Some(match geometry {
-            Geometry::LineString(g) => g.simplify(tolerance).into(),
-            Geometry::MultiLineString(g) => g.simplify(tolerance).into(),
-            Geometry::Polygon(g) => g.simplify(tolerance).into(),
-            Geometry::MultiPolygon(g) => g.simplify(tolerance).into(),
+            Geometry::LineString(g) => how.apply(g).into(),
+            Geometry::MultiLineString(g) => how.apply(g).into(),
+            Geometry::Polygon(g) => how.apply(g).into(),
+            Geometry::MultiPolygon(g) => how.apply(g).into(),
             other => other.clone(),
         })
     })
 }
 
-/// Takes the vertices out of every line and ring, each by itself, that span triangles under this
-/// area with their neighbours, smallest first (Visvalingam and Whyatt 1993).
-pub fn simplify_by_area(map: &Map, area: f64) -> Map {
-    map.map_geometries(|geometry| {
-        Some(match geometry {
-            Geometry::LineString(g) => g.simplify_vw(area).into(),
-            Geometry::MultiLineString(g) => g.simplify_vw(area).into(),
-            Geometry::Polygon(g) => g.simplify_vw(area).into(),
-            Geometry::MultiPolygon(g) => g.simplify_vw(area).into(),
-            other => other.clone(),
-        })
-    })
-}
-
-/// Deletes a share of the distinct vertices, chosen at random. A part that is left with too few
-/// goes whole, and its vertices count: the share is met to within the last part.
+/// Deletes a share of the distinct vertices, chosen at random. A part with too few remaining
+/// vertices is dropped, and its vertices count, so the share is exact to within the last part.
 ///
 /// # Errors
-/// Coordinates that are not finite.
+/// Fails on coordinates that are not finite.
 pub fn delete(map: &Map, share: f64, seed: u64) -> Result<Map> {
     let rank = PerVertex::draw(map, seed, Random::unit)?;
     let without = |below: f64| {
@@ -141,7 +147,7 @@ pub fn delete(map: &Map, share: f64, seed: u64) -> Result<Map> {
     };
     let target = (share * map.vertices()?.len() as f64).round() as usize;
     let left = map.vertices()?.len() - target;
-    // How many vertices go with their parts is found by bisection: more chosen, fewer left.
+    // Bisection finds how many vertices are dropped with their parts: more chosen, fewer left.
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = (low + high) / 2.0;
@@ -198,14 +204,14 @@ mod tests {
     #[test]
     fn simplification_drops_what_is_within_the_tolerance() {
         let map = in_memory(&["LINESTRING (0 0,50 4,99 0)", "LINESTRING (0 0,50 6,99 0)", "POINT (1 1)"]);
-        let simple = wkt(&simplify(&map, 5.0));
+        let simple = wkt(&simplify(&map, Simplification::Distance(5.0)));
         assert_eq!(simple, ["LINESTRING (0 0,99 0)", "LINESTRING (0 0,50 6,99 0)", "POINT (1 1)"]);
     }
 
     #[test]
     fn simplification_by_area_drops_small_triangles() {
         let map = in_memory(&["LINESTRING (0 0,5 1,10 0)", "LINESTRING (0 0,5 3,10 0)", "POINT (1 1)"]);
-        let simple = wkt(&simplify_by_area(&map, 10.0));
+        let simple = wkt(&simplify(&map, Simplification::Area(10.0)));
         assert_eq!(simple, ["LINESTRING (0 0,10 0)", "LINESTRING (0 0,5 3,10 0)", "POINT (1 1)"]);
     }
 

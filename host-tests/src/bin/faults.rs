@@ -1,4 +1,4 @@
-//! Kills writers of marked maps, and fills their disks, more often than the tests do:
+//! Kills writers of marked maps and simulates full disks more often than the tests do:
 //! `make faults`.
 
 use clap::Parser;
@@ -11,13 +11,13 @@ use rand_chacha::{
 /// Fails when anything but the complete output or the previous state is ever left.
 #[derive(Parser)]
 struct Arguments {
-    /// How many kills at random moments.
+    /// Number of kills at random moments
     #[arg(long, default_value_t = 100)]
     kills: usize,
-    /// Every how many calls that change files there is a kill, and a full disk.
+    /// Interval, in calls that change files, between kills and between full disks
     #[arg(long, default_value_t = 10)]
     step: usize,
-    /// Of the random moments; by default a new one.
+    /// Seed of the random moments; by default a new one
     #[arg(long)]
     seed: Option<u64>,
 }

@@ -1,4 +1,4 @@
-//! Makes fixtures/vectors again: key, record, marked map and the intermediate values.
+//! Writes fixtures/vectors anew: key, record, marked map and the intermediate values.
 //!
 //! The marked map and the record come from the driver, through ogr2ogr, as a user makes them; build
 //! it first (`make build`).
@@ -25,7 +25,7 @@ fn main() -> Result<()> {
     Ok(fs::write(folder.join("steps.json"), steps)?)
 }
 
-/// `ogr2ogr` through the driver, with a fixed date so that the same map has the same bytes.
+/// Runs `ogr2ogr` through the driver, with a fixed date so that the same map has the same bytes.
 fn mark(folder: &Path) -> Result<()> {
     let options = ["KEY=key.json", "RECORD=record.json", "CODE=REPETITION"].map(String::from);
     let options = options.into_iter().chain([format!("RECIPIENT={RECIPIENT}")]);

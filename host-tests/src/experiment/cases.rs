@@ -1,4 +1,4 @@
-//! What is done to a marked map, and who is asked about afterwards.
+//! The cases of the experiment: what happens to a marked map, and for whom it is verified.
 
 use crate::{
     attacks::{OtherMaps, Row, extended_rows, paper_rows},
@@ -7,7 +7,7 @@ use crate::{
 
 /// The demodulators of the command, the paper's first.
 pub const DEMODULATORS: [&str; 2] = ["paper", "joint"];
-/// Innocent recipients asked about after a collusion.
+/// Number of innocent recipients for whom a collusion is verified.
 pub const INNOCENTS: usize = 4;
 
 /// One row of the experiment.
@@ -19,12 +19,12 @@ pub enum Case {
     Unmarked,
     /// The marked copy is marked again with another key: a pirate's own mark.
     MarkedAgain,
-    /// So many recipients average their copies.
+    /// This number of recipients average their copies.
     Collusion { copies: usize },
 }
 
 impl Case {
-    /// A short name, unique.
+    /// Returns a short name, unique.
     pub fn id(&self) -> String {
         match self {
             Case::Attacked { row, .. } => row.id.clone(),
@@ -34,7 +34,7 @@ impl Case {
         }
     }
 
-    /// What is done.
+    /// Returns a description of the case.
     pub fn title(&self) -> String {
         match self {
             Case::Attacked { row, .. } => row.title.clone(),
@@ -44,7 +44,7 @@ impl Case {
         }
     }
 
-    /// The attack's strength, if it has one.
+    /// Returns the strength of the attack, if it has one.
     pub fn strength(&self) -> Option<f64> {
         match self {
             Case::Attacked { row, .. } => row.attack.strength(),
@@ -52,7 +52,7 @@ impl Case {
         }
     }
 
-    /// How many marked copies it takes.
+    /// Returns the number of marked copies that the case needs.
     pub fn copies(&self) -> usize {
         match self {
             Case::Collusion { copies } => *copies,
@@ -60,8 +60,8 @@ impl Case {
         }
     }
 
-    /// The demodulators it is measured with: colluders are many, so they only meet the default one,
-    /// and the paper has no code.
+    /// Returns the demodulators of the case. Collusions, which are many, use the default one alone,
+    /// and the paper's demodulator has no code.
     pub fn demodulators(&self, profile: Profile) -> &'static [&'static str] {
         match self {
             Case::Collusion { .. } => &["joint"],
@@ -70,7 +70,7 @@ impl Case {
         }
     }
 
-    /// Which of the report's tables it belongs to.
+    /// Returns the table of the report to which the case belongs.
     pub fn table(&self) -> Table {
         match self {
             Case::Attacked { in_paper: true, .. } => Table::Paper,
@@ -86,13 +86,13 @@ impl Case {
 pub enum Table {
     /// Table 2 of the paper.
     Paper,
-    /// Attacks the paper does not have.
+    /// The attacks that the paper does not have.
     Extended,
-    /// More than one question about a suspect, or none that should be answered with yes.
+    /// Suspects with several questions, or with none whose right answer is yes.
     Special,
 }
 
-/// All cases for a map.
+/// Returns all cases for a map.
 pub fn all(others: &OtherMaps) -> Vec<Case> {
     let attacked = |in_paper| move |row| Case::Attacked { row, in_paper };
     let mut cases: Vec<Case> = paper_rows().into_iter().map(attacked(true)).collect();

@@ -1,4 +1,4 @@
-//! The experiment: maps are rounded and marked, copies attacked, suspects verified.
+//! The experiment: it rounds and marks maps, attacks copies and verifies suspects.
 
 pub mod cases;
 
@@ -23,20 +23,20 @@ use std::{
 /// The paper's maps have integer coordinates in units of 10 cm.
 const PRECISION_M: f64 = 0.1;
 
-/// Which cases are run with which profile.
+/// The choice of the cases that run with a profile.
 pub type Wanted = dyn Fn(&Case, Profile) -> bool;
 
-/// What to run.
+/// The parts of the experiment to run.
 pub struct Plan {
     pub maps: Vec<PathBuf>,
     pub profiles: Vec<Profile>,
-    /// Whether a case is run at all with this profile.
+    /// Selects the cases that run with a profile.
     pub wanted: Box<Wanted>,
     pub seed: u64,
-    /// Processes at a time.
+    /// Number of processes at a time.
     pub workers: usize,
-    /// Where to keep references, copies, records, keys and suspects, to look into a verdict
-    /// afterwards.
+    /// The folder that keeps references, copies, records, keys and suspects, so that a verdict can
+    /// be examined afterwards.
     pub keep: Option<PathBuf>,
 }
 
@@ -50,18 +50,18 @@ pub struct Outcome {
     pub case: String,
     pub title: String,
     pub strength: Option<f64>,
-    /// Of the attack.
+    /// Seed of the attack.
     pub seed: u64,
     pub demodulator: &'static str,
-    /// About whom the question was.
+    /// The recipient of the question.
     pub asked: String,
     /// Whether the right answer is yes.
     pub guilty: bool,
-    /// None when the command gave no answer; `reason` is then what it printed.
+    /// `None` when the command gave no verdict; `reason` is its output then.
     pub verdict: Option<String>,
     pub reason: String,
     pub bits: usize,
-    /// None when the suspect was not registered.
+    /// `None` when the suspect was not registered.
     pub bit_errors: Option<usize>,
     pub p_value_log10: Option<f64>,
     pub p_mark_log10: Option<f64>,
@@ -75,12 +75,12 @@ pub struct Outcome {
     pub seconds: f64,
 }
 
-/// The bit error rate of one suspect; `None` when it was not registered.
+/// Returns the bit error rate of one suspect; `None` when it was not registered.
 pub fn bit_error_percent(outcome: &Outcome) -> Option<f64> {
     Some(100.0 * outcome.bit_errors? as f64 / outcome.bits as f64)
 }
 
-/// Whether the verdict is that the mark is there.
+/// Returns whether the verdict is that the mark is there.
 pub fn is_match(outcome: &Outcome) -> bool {
     outcome.verdict.as_deref() == Some("match")
 }
@@ -100,24 +100,24 @@ struct Sheet {
     copies: Vec<MarkedCopy>,
 }
 
-/// The number of a sheet, and what to do with it.
+/// The number of a sheet and the case for it.
 type Job = (usize, Case);
 
-/// A question: the suspect is what a [`Case`] made.
+/// A question about the suspect that a [`Case`] made.
 struct Question {
     asked: String,
     guilty: bool,
     key: PathBuf,
     reference: PathBuf,
-    /// `None`: the options a record would hold are given one by one.
+    /// `None` if options are given one by one in place of the record.
     record: Option<PathBuf>,
 }
 
-/// Runs a plan; `report` is called with every outcome as it comes.
+/// Runs a plan; `report` receives every outcome when it is known.
 ///
 /// # Errors
-/// Maps that cannot be read, are not in metres or cannot be marked. A suspect that cannot be
-/// verified is an outcome, not an error.
+/// Fails on maps that cannot be read, are not in metres or cannot be marked. A suspect that cannot
+/// be verified is an outcome, not an error.
 pub fn run(product: &Product, plan: &Plan, report: impl Fn(&Outcome) + Sync) -> Result<Vec<Outcome>> {
     let temporary = tempfile::tempdir()?;
     let folder = plan.keep.as_deref().unwrap_or(temporary.path());
@@ -167,7 +167,7 @@ impl Lab<'_> {
         self.folder.join("pirate.json")
     }
 
-    /// Marks all maps in all ways, and lists what to do with them.
+    /// Marks all maps in all ways, and lists the jobs for them.
     fn prepare(&self, plan: &Plan) -> Result<(Vec<Sheet>, Vec<Job>)> {
         let mut maps = Vec::new();
         for path in &plan.maps {
@@ -207,7 +207,8 @@ impl Lab<'_> {
         Ok(MarkedCopy { recipient, path, record })
     }
 
-    /// Makes the suspect of a case and asks about everybody; nobody when the attack leaves nothing.
+    /// Makes the suspect of a case and verifies it for everybody; for nobody when the attack leaves
+    /// nothing.
     fn run_case(&self, sheet: &Sheet, case: &Case) -> Result<Vec<Outcome>> {
         let suspect = self.folder.join(format!("{}-{}-{}.gpkg", sheet.name, sheet.profile.name(), case.id()));
         let seed = seed_of(self.seed, &sheet.name, &case.id());
@@ -235,7 +236,7 @@ impl Lab<'_> {
             Case::Attacked { row, .. } => {
                 let attacked = row.attack.apply(&Map::read(&first.path)?, seed)?;
                 attacked.write(suspect)?;
-                // A map without roads has no buffered roads to ask about.
+                // A map without roads has no buffered roads to verify.
                 let is_empty = attacked.geometries().next().is_none();
                 Ok(if is_empty { Vec::new() } else { vec![guilty(first)] })
             }
@@ -326,7 +327,7 @@ fn outcome(
     }
 }
 
-/// The attacks' lengths are metres, so a map must be in metres, too.
+/// Fails unless a map is in metres, as the lengths of the attacks are.
 fn check_metres(path: &Path) -> Result<()> {
     let dataset = gdal::Dataset::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let ground = survey(&dataset, &Selection::default()).and_then(|survey| survey.ground());
@@ -336,7 +337,7 @@ fn check_metres(path: &Path) -> Result<()> {
     }
 }
 
-/// The next map; for a single map its own mirror image.
+/// Returns the next map; for a single map its own mirror image.
 fn foreign(maps: &[Arc<Map>], number: usize) -> Result<Arc<Map>> {
     match maps {
         [only] => Ok(Arc::new(similarity::linear(only, similarity::mirror(), similarity::About::Centre)?)),
@@ -344,7 +345,7 @@ fn foreign(maps: &[Arc<Map>], number: usize) -> Result<Arc<Map>> {
     }
 }
 
-/// A seed for every map and case, whatever else is run (FNV-1a).
+/// Returns the seed of a map and a case, which does not depend on the other cases (FNV-1a).
 fn seed_of(seed: u64, map: &str, case: &str) -> u64 {
     let text = format!("{seed}/{map}/{case}");
     text.bytes()

@@ -1,5 +1,5 @@
-//! What differs between the file of plain `ogr2ogr` and a marked one, but for coordinates that
-//! moved a little.
+//! The differences between the file of plain `ogr2ogr` and a marked one, except for small moves of
+//! coordinates.
 
 use meshmark_host_tests::{
     contents::{self, LayerContents},
@@ -9,10 +9,10 @@ use std::{fs, path::Path};
 
 /// Metres on the ground.
 const TOLERANCE_M: f64 = 0.75;
-/// Metres of a degree of latitude, the longer one.
+/// Metres per degree of latitude, which is longer than one of longitude.
 const METRES_PER_DEGREE: f64 = 111_700.0;
 
-/// What differs.
+/// Returns the differences.
 pub fn files(host: &Host, format: &str, plain: &str, marked: &str) -> Option<String> {
     let attributes = match format {
         "ESRI Shapefile" => companions(&host.path(plain), &host.path(marked)),
@@ -24,7 +24,7 @@ pub fn files(host: &Host, format: &str, plain: &str, marked: &str) -> Option<Str
     attributes.or_else(|| geometries(format, &host.path(plain), &host.path(marked)))
 }
 
-/// The files beside a Shapefile's geometries, byte by byte.
+/// Compares the files beside the geometries of a Shapefile byte by byte.
 fn companions(plain: &Path, marked: &Path) -> Option<String> {
     let read = |path: &Path, ending: &str| fs::read(path.with_extension(ending)).ok();
     let differs = |ending: &&&str| read(plain, ending) != read(marked, ending);
@@ -32,8 +32,8 @@ fn companions(plain: &Path, marked: &Path) -> Option<String> {
     Some(format!("the .{ending} differs"))
 }
 
-/// The text of a GeoJSON file, in which numbers near the houses, longitudes of 24.9 and latitudes
-/// of 60.2, are rounded.
+/// Returns the text of a GeoJSON file with rounded numbers near the houses, which lie at longitude
+/// 24.9 and latitude 60.2.
 fn without_places(host: &Host, file: &str) -> Vec<String> {
     let bytes = fs::read(host.path(file)).unwrap();
     let rounded = |word: &str| match word.parse::<f64>() {
@@ -53,7 +53,8 @@ fn without_places(host: &Host, file: &str) -> Vec<String> {
     String::from_utf8_lossy(&bytes).lines().map(line).collect()
 }
 
-/// What `ogrinfo` says of a file and its features; FlatGeobuf orders and numbers them by place.
+/// Returns what `ogrinfo` prints of a file and its features; FlatGeobuf orders and numbers them by
+/// place.
 fn dump(host: &Host, format: &str, file: &str) -> Vec<String> {
     let run = host.run("ogrinfo", &["-al", "-geom=NO", file]);
     let is_ours = |line: &&str| {
@@ -86,7 +87,7 @@ fn cut(text: &str) -> String {
     text.chars().take(300).collect()
 }
 
-/// Values bit by bit, as far as the crate `gdal` reads them, and places.
+/// Compares values bit by bit, as far as the crate `gdal` reads them, and places.
 fn geometries(format: &str, plain: &Path, marked: &Path) -> Option<String> {
     let [before, after] = [plain, marked].map(|path| layers(format, path));
     if before.len() != after.len() {
@@ -122,7 +123,7 @@ fn geometries(format: &str, plain: &Path, marked: &Path) -> Option<String> {
     (coords(&before) == coords(&after)).then(|| "nothing is marked".into())
 }
 
-/// Whether the same geometries are null, and every coordinate is near where it was.
+/// Returns whether the same geometries are null, and every coordinate is near its old place.
 fn is_near(from: &[Option<Vec<[f64; 2]>>], to: &[Option<Vec<[f64; 2]>>]) -> bool {
     let near = |a: &[f64; 2], b: &[f64; 2]| {
         a.iter().zip(b).all(|(a, b)| (a - b).abs() * METRES_PER_DEGREE <= 2.0 * TOLERANCE_M)

@@ -1,7 +1,7 @@
-//! Odd tables, on all three ways a mark gets into a file, against plain `ogr2ogr`: whatever the
-//! names of layers and fields and whatever the values, nothing differs but the coordinates, and
-//! those by less than TOLERANCE. What plain `ogr2ogr` refuses is refused; anything else is refused
-//! only by a sentence of [`DOCUMENTED`].
+//! Odd tables on all three paths of a mark into a file, compared with plain `ogr2ogr`: whatever the
+//! names of layers and fields and whatever the values, only coordinates differ, by less than
+//! TOLERANCE. Tables that plain `ogr2ogr` refuses are refused; all others are refused by a sentence
+//! of [`DOCUMENTED`] only.
 
 mod compare;
 mod sources;
@@ -18,7 +18,7 @@ use std::{
     thread,
 };
 
-/// Formats that are written, and how the names of their files end.
+/// The formats of outputs, and the endings of their file names.
 const FORMATS: [(&str, &str); 5] = [
     ("GPKG", "gpkg"),
     ("ESRI Shapefile", "shp"),
@@ -27,17 +27,17 @@ const FORMATS: [(&str, &str); 5] = [
     ("GeoJSONSeq", "geojsonl"),
 ];
 
-/// How many tables are made; each goes into one format on all ways.
+/// Number of tables; each goes into one format on all paths.
 const TABLES: u64 = 120;
 
-/// Refusals of what plain `ogr2ogr` writes: a part of the sentence, which docs/driver.md or
-/// docs/distribute.md has, and why it is so.
+/// Refusals of tables that plain `ogr2ogr` writes: a part of the sentence, which docs/driver.md or
+/// docs/distribute.md has, and the reason.
 const DOCUMENTED: &[(&str, &str)] = &[(
     "FlatGeobuf with a spatial index leaves out features without a geometry",
     "plain ogr2ogr drops them without a word; a map that is marked as a whole is not to lose any",
 )];
 
-/// The ways a mark gets into a file.
+/// The paths of a mark into a file.
 const WAYS: [&str; 3] = ["read", "write", "distribute"];
 
 #[test]
@@ -59,7 +59,7 @@ fn every_way_writes_what_plain_ogr2ogr_does_but_for_the_coordinates() {
     assert!(found.is_empty(), "{} differences:\n{}", found.len(), found.join("\n"));
 }
 
-/// What differs for the table of this seed, on any way.
+/// Returns the differences for the table of this seed on any path.
 fn differences(seed: u64) -> Vec<String> {
     let host = Host::new();
     let mut random = ChaCha20Rng::seed_from_u64(seed);
@@ -94,7 +94,7 @@ fn differences(seed: u64) -> Vec<String> {
     found
 }
 
-/// Marks the source on one of the ways; the file that is there.
+/// Marks the source on one of the paths, and returns the file.
 fn mark(host: &Host, way: &str, format: &str, file: &str, source: &str) -> (Run, Option<String>) {
     let options = ["KEY=key.json", "RECIPIENT=A", "PATCH_SIZE=260"];
     let marked = format!("MESHMARK:{source}");

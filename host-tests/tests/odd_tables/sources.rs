@@ -9,11 +9,11 @@ use std::fs;
 pub struct Source {
     /// The file that GDAL opens.
     pub path: String,
-    /// What it is, for messages.
+    /// A description for messages.
     pub what: String,
 }
 
-/// How many houses there are, four vertices each.
+/// Number of houses, with four vertices each.
 const HOUSES: usize = 80;
 
 const FIELD_NAMES: &[&str] = &[
@@ -151,7 +151,7 @@ const TYPES: &[(&str, &str, &[&str])] = &[
 ];
 
 impl Source {
-    /// Makes one.
+    /// Makes a random table.
     pub fn make(host: &Host, random: &mut ChaCha20Rng, seed: u64) -> Self {
         match seed % 3 {
             0 => virtual_table(host, random),
@@ -169,13 +169,13 @@ fn choice<'a, T>(random: &mut ChaCha20Rng, of: &'a [T]) -> &'a T {
     &of[below(random, of.len())]
 }
 
-/// So many different ones.
+/// Returns this number of different choices.
 fn choices<'a, T>(random: &mut ChaCha20Rng, of: &'a [T], count: usize) -> Vec<&'a T> {
     let mut rest: Vec<&T> = of.iter().collect();
     (0..count.min(of.len())).map(|_| rest.swap_remove(below(random, rest.len()))).collect()
 }
 
-/// The corners of a house: in degrees, so that every format takes it.
+/// Returns the corners of a house in degrees, which every format accepts.
 fn house(number: usize, random: &mut ChaCha20Rng) -> Vec<[f64; 2]> {
     let (x, y) = (24.9 + (number % 10) as f64 * 6e-4, 60.2 + (number / 10) as f64 * 3e-4);
     let mut jitter = || below(random, 10_000) as f64 * 1e-9;
@@ -186,7 +186,7 @@ fn house(number: usize, random: &mut ChaCha20Rng) -> Vec<[f64; 2]> {
     ring
 }
 
-/// A virtual layer over a CSV file: fields of any type and name, layers of any name.
+/// Makes a virtual layer over a CSV file: fields of any type and name, layers of any name.
 fn virtual_table(host: &Host, random: &mut ChaCha20Rng) -> Source {
     let layer = *choice(random, LAYER_NAMES);
     let names = choices(random, FIELD_NAMES, 4);
@@ -242,7 +242,8 @@ fn virtual_table(host: &Host, random: &mut ChaCha20Rng) -> Source {
     Source { path: "table.vrt".into(), what }
 }
 
-/// A GeoJSON file, where a property may be missing, null, or of another type in every feature.
+/// Makes a GeoJSON file, in which a property may be missing, null, or of another type in every
+/// feature.
 fn geojson(host: &Host, random: &mut ChaCha20Rng) -> Source {
     let layer = *choice(random, LAYER_NAMES);
     let names = choices(random, FIELD_NAMES, 5);
@@ -281,7 +282,7 @@ fn geojson(host: &Host, random: &mut ChaCha20Rng) -> Source {
         }
         match below(random, 20) {
             0 => feature["properties"] = Value::Null,
-            // A reader then takes the geometry for a value of the attribute that is called so.
+            // A reader takes the geometry for a value of the attribute of that name then.
             1 if !names.contains(&&"geometry") => {
                 feature.as_object_mut().unwrap().remove("properties");
             }
@@ -326,7 +327,7 @@ fn value_of(kind: usize, number: usize, random: &mut ChaCha20Rng) -> Value {
     }
 }
 
-/// A Shapefile whose names and texts are bytes of any encoding, whatever its code page says.
+/// Makes a Shapefile whose names and texts are bytes of any encoding, whatever its code page.
 fn shapefile(host: &Host, random: &mut ChaCha20Rng) -> Source {
     let layer = ["map", "gpkg_map", "sqlite_map", "a,b", "it's", "100%s%n", "名称"][below(random, 7)];
     let fields = 4;

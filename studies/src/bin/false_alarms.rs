@@ -6,7 +6,7 @@ use meshmark_host_tests::{Result, product::Product};
 use meshmark_studies::false_alarms::{markdown, pooled, study, write};
 use std::{path::PathBuf, process::ExitCode};
 
-/// Take wrong keys and wrong recipients to marked, attacked and unmarked copies of maps.
+/// Test wrong keys and wrong recipients on marked, attacked and unmarked copies of maps.
 #[derive(Parser)]
 struct Arguments {
     /// Maps in metres
@@ -23,7 +23,7 @@ struct Arguments {
     seed: u64,
 }
 
-/// What `meshmark verify` takes for a match by default.
+/// The default significance of `meshmark verify`.
 const SIGNIFICANCE: f64 = 1e-6;
 
 fn main() -> ExitCode {
@@ -41,7 +41,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let product = Product::of_this_build()?;
     let mut samples = Vec::new();
     for (number, map) in arguments.maps.iter().enumerate() {
-        // Every map has keys of its own: p-values of one key on two maps are not independent.
+        // Every map has its own keys, as p-values of one key on two maps are not independent.
         let of_map = study(&product, map, arguments.count, arguments.seed + number as u64)
             .map_err(|error| format!("{}: {error}", map.display()))?;
         samples.extend(of_map);

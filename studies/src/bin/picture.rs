@@ -1,4 +1,5 @@
-//! Draws a piece of a map before and after marking, the displacement exaggerated, as SVG on stdout.
+//! Draws a piece of a map before and after marking, with exaggerated displacement, as SVG on
+//! stdout.
 //!
 //! Usage: picture REFERENCE MARKED LAYER WEST SOUTH EAST NORTH EXAGGERATION > picture.svg
 
@@ -51,7 +52,7 @@ fn main() {
 /// Rings and lines by feature id.
 type Features = BTreeMap<u64, Vec<Vec<[f64; 2]>>>;
 
-/// The features of a layer that touch a window.
+/// Returns the features of a layer that touch a window.
 fn rings(path: &str, layer: &str, [west, south, east, north]: [f64; 4]) -> Features {
     let dataset = Dataset::open(path).unwrap_or_else(|error| panic!("{path}: {error}"));
     let mut layer = dataset.layer_by_name(layer).unwrap_or_else(|error| panic!("{path}: {error}"));

@@ -1,6 +1,6 @@
-//! What marking does to maps: `quality MAP...` marks each with every SHAPE and BASIS through the
-//! driver, compares it with the original by `meshmark compare`, and prints a Markdown table. It
-//! fails when a polygon has become invalid, or two overlap that did not.
+//! Measures the effect of marking on maps: `quality MAP...` marks each with every SHAPE and BASIS
+//! through the driver, compares it with the original by `meshmark compare`, and prints a Markdown
+//! table. It fails when a polygon becomes invalid, or two polygons newly overlap.
 
 use clap::Parser;
 use meshmark_core::{
@@ -15,7 +15,7 @@ use std::{
     process::ExitCode,
 };
 
-/// What marking does to the shape and topology of maps.
+/// Measure the effect of marking on the shape and topology of maps.
 #[derive(Parser)]
 struct Arguments {
     /// Maps
@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Whether every map stayed as good as it was.
+/// Returns whether every map kept its quality.
 fn run(Arguments { maps, mut option, precision, shapes }: Arguments) -> Result<bool> {
     option.extend(precision.iter().map(|precision| format!("PRECISION={precision}")));
     let work = Work::new(option, precision)?;
@@ -95,7 +95,7 @@ fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
     )
 }
 
-/// What `meshmark compare` and the record say.
+/// The figures of `meshmark compare` and of the record.
 struct Marked {
     comparison: Value,
     record: Value,
@@ -107,7 +107,7 @@ impl Marked {
     }
 }
 
-/// A folder for the copies, and what makes them.
+/// A folder for the copies, and the settings that make them.
 struct Work {
     folder: tempfile::TempDir,
     product: Product,

@@ -1,9 +1,9 @@
-//! How exactly `meshmark verify` finds the way back: `registration_accuracy MAP...` marks maps,
-//! puts the copies through affine maps drawn at random, verifies them, and prints a Markdown table
-//! of what is left of the way there and back.
+//! Measures the accuracy of the registration in `meshmark verify`: `registration_accuracy MAP...`
+//! marks maps, transforms the copies by random affine maps, verifies them, and prints a Markdown
+//! table of the remaining errors.
 //!
 //! The error of a registration is the root mean square, over vertices of the reference, of the
-//! distance between a vertex and where the true affine map and then the recovered one take it.
+//! distance between a vertex and its image under the true affine map and then the recovered one.
 
 use clap::Parser;
 use geo::{CoordsIter, Geometry};
@@ -29,7 +29,7 @@ struct Arguments {
     seed: u64,
 }
 
-/// What is left of a marked map before it goes through an affine map.
+/// The part of a marked map that remains before the affine map.
 struct Suspect {
     title: &'static str,
     registration: &'static str,
@@ -57,7 +57,7 @@ const SUSPECTS: &[Suspect] = &[
 
 const QUARTER: crop::Window = crop::Window::Quarter { column: 1, row: 0 };
 const SIXTEENTH: crop::Window = crop::Window::Centre { area_share: 1.0 / 16.0 };
-/// An error beyond this is no registration.
+/// With a larger error, metres, a suspect counts as not registered.
 const FOUND_M: f64 = 1.0;
 
 fn main() -> ExitCode {
@@ -91,8 +91,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// A row of the table: one map. `longest`: seconds of the longest registration so far, for every
-/// suspect.
+/// Returns the row of one map in the table. `longest` holds the seconds of the longest registration
+/// so far for every suspect.
 fn row(product: &Product, path: &Path, seed: u64, longest: &mut [f64]) -> Result<String> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str| folder.path().join(name);
@@ -122,13 +122,13 @@ fn row(product: &Product, path: &Path, seed: u64, longest: &mut [f64]) -> Result
     Ok(format!("| {name} | {} | {} |", reference.vertices()?.len(), cells.join(" | ")))
 }
 
-/// Lines alone.
+/// Returns the lines of a map alone.
 fn lines(map: &Map) -> Map {
     let is_line = |g: &Geometry| matches!(g, Geometry::LineString(_) | Geometry::MultiLineString(_));
     map.map_geometries(|geometry| is_line(geometry).then(|| geometry.clone()))
 }
 
-/// Every vertex as a point, without attributes.
+/// Returns every vertex as a point, without attributes.
 fn points(map: &Map) -> Map {
     let as_points = |geometry: &Geometry| {
         let points = geometry.coords_iter().map(geo::Point::from).collect();
@@ -137,8 +137,8 @@ fn points(map: &Map) -> Map {
     features::drop_attributes(&map.map_geometries(as_points))
 }
 
-/// A rotation by any angle, scales of 0.5 to 2 along two axes, a shear, a mirror or none, a shift
-/// of up to 100 km.
+/// Returns a rotation by any angle, scales of 0.5 to 2 along two axes, a shear, a mirror or none, a
+/// shift of up to 100 km.
 fn affine(random: &mut Random, about: [f64; 2]) -> [f64; 6] {
     let (sin, cos) = (std::f64::consts::PI * random.symmetric(1.0)).sin_cos();
     let (x_scale, y_scale) = (2f64.powf(random.symmetric(1.0)), 2f64.powf(random.symmetric(1.0)));
@@ -154,7 +154,7 @@ fn apply([a, b, c, d, e, f]: &[f64; 6], [x, y]: [f64; 2]) -> [f64; 2] {
     [a * x + b * y + c, d * x + e * y + f]
 }
 
-/// Over the reference vertices in the bounding box of the part.
+/// Returns the error over the reference vertices in the bounding box of the part.
 fn error_m(reference: &VertexTable, part: &VertexTable, there: &[f64; 6], back: &Registration) -> f64 {
     let (min, max) = part.bounds();
     let inside = |p: &&[f64; 2]| [0, 1].iter().all(|&i| (min[i]..=max[i]).contains(&p[i]));

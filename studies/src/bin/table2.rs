@@ -48,13 +48,13 @@ struct Arguments {
     /// New folder in which to keep references, marked copies, records, keys and suspects
     #[arg(long)]
     keep: Option<PathBuf>,
-    /// Folder of `meshmark` and `gdalplugins/` [default: where this program is]
+    /// Folder of `meshmark` and `gdalplugins/` [default: that of this program]
     #[arg(long)]
     tools: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
-    // The verdicts speak; GDAL's warnings about versions of GeoPackage do not help.
+    // GDAL's warnings about versions of GeoPackage do not help the reader.
     gdal::config::set_error_handler(|_, _, _| {});
     match run_all(Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -73,7 +73,7 @@ fn run_all(arguments: Arguments) -> Result<()> {
     let product = product.with_options(arguments.option);
     let (quick, rows) = (arguments.quick, arguments.rows.clone());
     let wanted = move |case: &Case, profile: Profile| {
-        // The paper's two chip rates on its own rows; on all others the two codes at the same
+        // The paper's own rows use its two chip rates; all others use the two codes at the same
         // displacement.
         let is_measured = case.table() == Table::Paper || (!quick && profile != Profile::repetition(3));
         is_measured && (rows.is_empty() || rows.contains(&case.id()))
@@ -93,7 +93,7 @@ fn run_all(arguments: Arguments) -> Result<()> {
     println!("seed {}, {} maps", plan.seed, plan.maps.len());
     std::fs::create_dir_all(&arguments.out)?;
     let (out, version) = (arguments.out, product.version()?);
-    // A run takes long; one that is stopped leaves the tables of what it has.
+    // A run takes long; one that is stopped leaves the tables of its results so far.
     let so_far = Mutex::new(Vec::new());
     let outcomes = run(&product, &plan, |outcome| {
         print(outcome);
@@ -116,7 +116,7 @@ fn profile(text: &str) -> std::result::Result<Profile, String> {
     }
 }
 
-/// Files as they are given, folders as the GeoPackages in them.
+/// Returns files unchanged, and folders as the GeoPackages in them.
 fn geopackages(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut maps = Vec::new();
     for path in paths {

@@ -1,4 +1,4 @@
-//! The figures: which attacks make a line, and which lines a plot.
+//! The figures: this module combines attacks into lines, and lines into plots.
 
 use super::{
     paper,
@@ -59,17 +59,17 @@ const FAMILIES: [Family; 5] = [
     },
 ];
 
-/// File names and drawings, of those families that were measured.
+/// Returns the file names and drawings of those families that were measured.
 ///
 /// # Errors
-/// A plot cannot be drawn.
+/// Fails when a plot cannot be drawn.
 pub fn all(outcomes: &[Outcome]) -> Result<Vec<(&'static str, String)>> {
     let drawn = FAMILIES.iter().map(|family| (family.file, family.plot(outcomes)));
     let shown = drawn.filter(|(_, plot)| !plot.series.is_empty());
     shown.map(|(file, plot)| Ok((file, plot.to_svg()?))).collect()
 }
 
-/// Light, dark and middle: both demodulators and what was published.
+/// The colours of both demodulators and of the published values: light, dark and middle.
 const BLUES: [RGBColor; 3] = [RGBColor(158, 202, 225), RGBColor(8, 81, 156), RGBColor(66, 146, 198)];
 const ORANGES: [RGBColor; 3] = [RGBColor(253, 174, 107), RGBColor(166, 54, 3), RGBColor(241, 105, 19)];
 
@@ -106,12 +106,13 @@ impl Family {
     }
 }
 
-/// Raw bit errors only: with a code there are none, or many.
+/// Returns whether an outcome belongs to a family. Only raw bit errors make a line; with a code
+/// there are none, or many.
 fn of_family(family: &Family, outcome: &Outcome) -> bool {
     family.ids.contains(&outcome.case.as_str()) && outcome.profile != Profile::LDPC
 }
 
-/// One point for every strength, with what `rate` makes of its outcomes.
+/// Returns one point for every strength, with the `rate` of its outcomes.
 fn points(outcomes: &[&Outcome], rate: impl Fn(&[&Outcome]) -> Option<f64>) -> Vec<(f64, f64)> {
     let mut strengths = distinct(outcomes.iter().filter_map(|o| o.strength));
     strengths.sort_by(f64::total_cmp);

@@ -14,7 +14,7 @@ use meshmark_host_tests::{
 };
 use std::fmt::Write;
 
-/// All tables.
+/// Returns all tables.
 pub fn report(all: &[Outcome], seed: u64, version: &str) -> String {
     let (coded, outcomes): (Vec<Outcome>, Vec<Outcome>) =
         all.iter().cloned().partition(|o| o.profile == Profile::LDPC);
@@ -50,7 +50,7 @@ fn head(outcomes: &[Outcome], seed: u64, version: &str) -> String {
     )
 }
 
-/// One row for every attack, averaged over maps.
+/// Returns one row for every attack, averaged over maps.
 fn averages(outcomes: &[Outcome], table: Table) -> String {
     let of_table: Vec<&Outcome> = outcomes.iter().filter(|o| o.table == table).collect();
     let rates = chip_rates(of_table.iter().copied());
@@ -108,8 +108,8 @@ fn chip_rates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<usize> {
     distinct(outcomes.map(|o| o.profile.chip_rate))
 }
 
-/// The coded message beside the repeated one of the same displacement: on how many maps it came
-/// back whole.
+/// Returns on how many maps the message was read without an error, coded and repeated with the same
+/// displacement.
 fn whole_messages(plain: &[Outcome], coded: &[Outcome]) -> String {
     if coded.is_empty() {
         return String::new();
@@ -148,7 +148,7 @@ fn p_value(cell: &Cell) -> String {
     cell.p_value_log10.map_or("–".into(), |p| format!("10^{p:.0}"))
 }
 
-/// Suspects about which more than one question is asked, or which nobody should be found in.
+/// Returns the table of suspects with several questions, or in which no recipient may be found.
 fn special(outcomes: &[Outcome]) -> String {
     let of_table: Vec<&Outcome> = outcomes.iter().filter(|o| o.table == Table::Special).collect();
     if of_table.is_empty() {
@@ -192,7 +192,7 @@ fn special(outcomes: &[Outcome]) -> String {
     text + "\n"
 }
 
-/// Suspects that were not registered or that the command refused, by name.
+/// Lists suspects that were not registered or that the command refused.
 fn unanswered(outcomes: &[Outcome]) -> String {
     let is = |o: &&Outcome| o.demodulator == "joint" && o.bit_errors.is_none();
     let rows: String = outcomes

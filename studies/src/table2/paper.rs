@@ -27,7 +27,7 @@ pub const TABLE_2: [(&str, f64, f64); 21] = [
     ("10-8", 18.8, 15.1),
 ];
 
-/// The paper's bit error rate, per cent.
+/// Returns the paper's bit error rate, per cent.
 pub fn bit_error_percent(id: &str, chip_rate: usize) -> Option<f64> {
     let (_, two, three) = TABLE_2.into_iter().find(|(number, ..)| *number == id)?;
     match chip_rate {

@@ -7,11 +7,11 @@ use meshmark_host_tests::experiment::{Outcome, bit_error_percent, is_match};
 pub struct Cell {
     /// Mean bit error rate, per cent; a suspect that was not registered counts 50.
     pub bit_error_percent: f64,
-    /// Suspects.
+    /// Number of suspects.
     pub count: usize,
-    /// Of them not registered.
+    /// Number of suspects that were not registered.
     pub unregistered: usize,
-    /// Verdicts "match".
+    /// Number of verdicts "match".
     pub matches: usize,
     /// Median of the p-values, log₁₀, of registered suspects.
     pub p_value_log10: Option<f64>,
@@ -19,7 +19,7 @@ pub struct Cell {
     pub seconds: f64,
 }
 
-/// Sums up the outcomes about recipients of the suspect's copies; `None` without any.
+/// Summarises the outcomes for recipients of the suspect's copies; `None` without any.
 pub fn cell<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Option<Cell> {
     let outcomes: Vec<&Outcome> = outcomes.into_iter().collect();
     let count = outcomes.len();
@@ -39,7 +39,7 @@ pub fn cell<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Option<Cell>
     })
 }
 
-/// Distinct values in the order of their first occurrence.
+/// Returns distinct values in the order of their first occurrence.
 pub fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut distinct = Vec::new();
     for value in values {
@@ -55,7 +55,8 @@ pub(super) mod tests {
     use super::*;
     use meshmark_host_tests::{experiment::cases::Table, product::Profile};
 
-    /// An outcome on a map called "town"; `None` bit errors is a suspect that was not registered.
+    /// Returns an outcome on a map called "town"; `None` bit errors stand for a suspect that was
+    /// not registered.
     pub fn outcome(
         id: &str,
         chip_rate: usize,

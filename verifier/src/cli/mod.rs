@@ -1,6 +1,7 @@
 //! The command line: it turns flags into an exit code.
 
 mod arguments;
+mod command_line;
 mod request;
 
 use crate::package_files;
@@ -11,12 +12,11 @@ use meshmark_verifier::{
     Error, ExitCode, Result,
     compare::{Comparison, compare, detail::ComparedFiles},
     distribute, html,
-    inputs::{digests::Inputs, gdal_failures, texts},
+    inputs::{digests::Digests, gdal_failures, texts, versions::versions},
+    outputs::{EvidenceMapFile, Format, ReportFile},
     progress::Progress,
-    report::{self, EvidenceMapFile, Format, Provenance, Report, ReportFile},
-    verify,
-    verify::with_reference_of_record,
-    verify_records,
+    report::{self, Provenance, Report},
+    verify, verify_records,
     words::printable,
 };
 use request::request;
@@ -60,14 +60,14 @@ fn print(text: &str) -> Result<()> {
 
 fn keygen(path: &PathBuf) -> Result<()> {
     let mut secret = zeroize::Zeroizing::new([0; 32]);
-    getrandom::fill(secret.as_mut_slice()).map_err(|error| Error::Random { reason: error.to_string() })?;
+    getrandom::fill(secret.as_mut_slice()).map_err(|source| Error::Random { source })?;
     let key = SecretKey::from_bytes(*secret);
     let failed = |error: std::io::Error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Exists {
             path: path.clone(),
             remedy: ", and a key is never overwritten: name another file",
         },
-        _ => Error::Unwritten { what: format!("the key file {}", path.display()), source: error, remedy: "" },
+        _ => Error::unwritten(format!("the key file {}", path.display()), error),
     };
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create_new(true);
@@ -86,7 +86,7 @@ fn keygen(path: &PathBuf) -> Result<()> {
 fn write_package_files(folder: &Path) -> Result<()> {
     package_files::write(Cli::command(), folder).map_err(|source| {
         let what = format!("the folder {} for man pages and completions", folder.display());
-        Error::Unwritten { what, source, remedy: "" }
+        Error::unwritten(what, source)
     })?;
     Ok(())
 }
@@ -96,7 +96,7 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let provenance = file
         .as_ref()
-        .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line()))
+        .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line::own()))
         .transpose()?;
     let mut comparison =
         compare(&args.reference, &args.marked, layers.as_deref(), args.precision, file.is_some())?;
@@ -136,31 +136,24 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     let wanted = args.explain || file.is_some();
-    let (key, references, suspect) = (args.key.clone(), args.reference.clone(), args.suspect.clone());
-    let digest = |reference: &Path| Inputs::read(&key, reference, &suspect);
-    let inputs = match references.as_slice() {
-        [one] if wanted => Some(digest(one)?), // as they are before the verification
-        _ => None,
-    };
-    let (json, explain) = (args.json, args.explain);
-    let (records, record) = (args.records.clone(), args.record.clone());
+    let references = args.reference.clone();
+    let digest = || Digests::read(&args.key, &references, &args.suspect, args.record.as_deref());
+    let digests = wanted.then(digest).transpose()?;
+    let (json, explain, records) = (args.json, args.explain, args.records.clone());
     let request = request(args)?;
     let mut progress = Progress::default();
     let mut report = match &records {
         Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,
-        None => verify(&with_reference_of_record(&request, &references, &mut progress)?, &mut progress)?,
+        None => verify(&request, &references, &mut progress)?,
     };
     if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
-        map.write(&target)?;
+        target.write(&map)?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
     print(&if json { report.to_json() } else { report.to_text() })?;
-    if !wanted {
-        return Ok(report.exit_code());
-    }
-    let inputs = inputs.map_or_else(|| digest(&report.reference), Ok)?;
+    let Some(digests) = digests else { return Ok(report.exit_code()) };
     let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
-    let inputs = inputs.with_record(record.or_else(best).as_deref())?;
+    let inputs = digests.of_verification(&report.reference, best().as_deref())?;
     if explain {
         print(&format!("\n{}", report::explain(&inputs, &report)))?;
     }
@@ -169,8 +162,8 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
             inputs,
             reference_vertices_sha256: report.reference_digest.clone(),
             suspect_crs: report.suspect_crs.clone(),
-            command: command_line(),
-            versions: report::versions(),
+            command: command_line::own(),
+            versions: versions(),
         };
         let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
         file.write(&match file.format() {
@@ -179,9 +172,4 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
         })?;
     }
     Ok(report.exit_code())
-}
-
-/// Returns the command line of this process.
-fn command_line() -> String {
-    report::command_line(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }

@@ -2,8 +2,12 @@
 
 use crate::{
     Result,
-    inputs::digests::{Digested, digest},
-    report::sketch::{ARROWS, BINS, Extent, Thinning, lines},
+    inputs::{
+        digests::{Digested, digest},
+        versions::versions,
+    },
+    report::Extent,
+    thinning::{ARROWS, BINS, PointGrid, extent_of, lines},
 };
 use meshmark_core::{distortion::Corner, scale::Measure, vertices::VertexTable};
 use meshmark_detection::Histogram;
@@ -74,7 +78,7 @@ impl ComparedFiles {
     /// # Errors
     /// Fails when one of them cannot be read to its end.
     pub fn read(reference: &Path, marked: &Path, command: String) -> Result<Self> {
-        let versions = crate::report::versions();
+        let versions = versions();
         Ok(ComparedFiles { reference: digest(reference)?, marked: digest(marked)?, command, versions })
     }
 }
@@ -93,14 +97,14 @@ pub(super) struct Findings<'a> {
 
 impl Findings<'_> {
     pub fn detail(self) -> Detail {
-        let (coords, extent) = (self.vertices.coords(), Extent::new(self.vertices, &self.measure.ground));
+        let (coords, extent) = (self.vertices.coords(), extent_of(self.vertices, &self.measure.ground));
         let pairs = coords.iter().zip(self.moved);
         let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.measure.metres_between(*a, *b)).collect();
         let lengths: Vec<f64> = displacements.iter().map(|[x, y]| x.hypot(*y)).collect();
         let changes: Vec<f64> = self.corners.iter().map(Corner::change_deg).collect();
-        let mut arrows = Thinning::new(&extent, ARROWS);
+        let mut arrows = PointGrid::new(&extent, ARROWS);
         let shown = coords.iter().zip(&displacements).filter(|(at, _)| arrows.takes(**at));
-        let grid = Thinning::new(&extent, CELLS);
+        let grid = PointGrid::new(&extent, CELLS);
         let [torn, invalid, overlaps, crossings] = self.places.map(|mut places| {
             places.truncate(MOST_PLACES);
             places
@@ -120,7 +124,7 @@ impl Findings<'_> {
 }
 
 /// Returns the middle and the largest change of every cell with a notable change.
-fn cells(grid: &Thinning, corners: &[Corner]) -> Vec<[f64; 3]> {
+fn cells(grid: &PointGrid, corners: &[Corner]) -> Vec<[f64; 3]> {
     let mut largest: BTreeMap<[u32; 2], f64> = BTreeMap::new();
     for corner in corners.iter().filter(|corner| corner.change_deg() >= NOTABLE_DEG) {
         let cell = largest.entry(grid.cell_of(corner.at)).or_default();

@@ -1,7 +1,8 @@
 //! The copies to make: the names of their files, and whether they are finished.
 
+use super::opening::open;
 use crate::{Error, Result};
-use gdal::{Dataset, vector::LayerAccess};
+use gdal::vector::LayerAccess;
 use meshmark_core::{
     key::SecretKey,
     message::Message,
@@ -16,8 +17,8 @@ use std::{
 };
 
 /// Returns whether GDAL opens a copy, and its layers have the feature counts of the map.
-fn has_features(file: &Path, map: &Survey) -> bool {
-    let Ok(dataset) = Dataset::open(file) else { return false };
+fn has_features(file: &Path, driver: &str, map: &Survey) -> bool {
+    let Ok(dataset) = open(file, driver) else { return false };
     map.features
         .iter()
         .all(|(&layer, &count)| dataset.layer(layer).is_ok_and(|layer| layer.feature_count() == count))
@@ -34,6 +35,7 @@ pub struct MarkedCopy {
     pub file: PathBuf,
     /// The record.
     pub record: PathBuf,
+    driver: &'static str,
 }
 
 impl MarkedCopy {
@@ -41,7 +43,7 @@ impl MarkedCopy {
     pub fn new(recipient: String, folder: &Path, format: &Format) -> Self {
         let stem = stem(&recipient);
         let path = |ending: &str| folder.join(format!("{stem}{ending}"));
-        MarkedCopy { file: path(format.ending()), record: path(".json"), recipient }
+        MarkedCopy { file: path(format.ending()), record: path(".json"), recipient, driver: format.driver }
     }
 
     /// Returns the bits that the code carries in the copy.
@@ -68,7 +70,7 @@ impl MarkedCopy {
             return refused(&self.record, "is not the record of this map, key, recipient and options");
         }
         if has_record && self.file.is_file() {
-            return match has_features(&self.file, map) {
+            return match has_features(&self.file, self.driver, map) {
                 true => Ok(true),
                 false => {
                     refused(&self.file, "is damaged or was changed: it does not have the features of the map")

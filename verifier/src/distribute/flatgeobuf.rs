@@ -5,9 +5,10 @@
 //! size prefix (flatgeobuf.org/src/fbs). The index is a packed R-tree: nodes of a bounding box and
 //! an offset, level by level, the root first.
 
-use crate::{Error, Result, inputs::gdal_failures};
-use gdal::{Dataset, vector::LayerAccess};
-use meshmark_dataset::{file_error, marking::Moves};
+use super::opening::open;
+use crate::{Error, Result, inputs::gdal_failures::GdalFailure};
+use gdal::vector::LayerAccess;
+use meshmark_dataset::{Action, file_error, marking::Moves};
 use std::{fs, ops::Range, path::Path};
 
 /// The first bytes of a file of any version.
@@ -36,7 +37,7 @@ const NOTHING: Bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::N
 
 /// Writes a copy of `plain` with moved vertices.
 pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
-    let mut bytes = fs::read(plain).map_err(|error| file_error("reading", plain, error))?;
+    let mut bytes = fs::read(plain).map_err(|error| file_error(Action::Reading, plain, error))?;
     let parts = Parts::parse(&bytes).ok_or(Error::UnknownFlatGeobuf)?;
     let mut places = Vec::new();
     let mut at = parts.features.start;
@@ -53,21 +54,17 @@ pub fn write(plain: &Path, file: &Path, moves: Moves) -> Result<()> {
         let [x, y] = moves.destination(point).ok_or(Error::MapChanged)?;
         put(&mut bytes, place, &[x, y]);
     }
-    fs::write(file, &bytes).map_err(|error| file_error("writing", file, error))?;
+    fs::write(file, &bytes).map_err(|error| file_error(Action::Writing, file, error))?;
     let boxes = boxes(file)?;
     parts.fit(&mut bytes, &boxes).ok_or(Error::UnknownFlatGeobuf)?;
-    Ok(fs::write(file, &bytes).map_err(|error| file_error("writing", file, error))?)
+    Ok(fs::write(file, &bytes).map_err(|error| file_error(Action::Writing, file, error))?)
 }
 
 /// Returns the bounding boxes of all features in the order of the file. GDAL computes the extent of
 /// arcs.
 fn boxes(file: &Path) -> Result<Vec<Bounds>> {
-    gdal_failures::forget_failure();
-    let failed = |error: gdal::errors::GdalError| {
-        let reason = gdal_failures::last_failure().unwrap_or_else(|| error.to_string());
-        Error::NotWritten { what: "FlatGeobuf".into(), reason }
-    };
-    let dataset = Dataset::open(file).map_err(failed)?;
+    let failed = |error| Error::unwritten("FlatGeobuf", GdalFailure::new(error));
+    let dataset = open(file, "FlatGeobuf")?;
     let mut layer = dataset.layer(0).map_err(failed)?;
     let of_feature = |feature: gdal::vector::Feature| match feature.geometry_by_index(0) {
         Ok(geometry) if !geometry.is_empty() => {

@@ -3,7 +3,7 @@
 
 use crate::{Error, Result};
 use meshmark_dataset::{
-    file_error,
+    Action, file_error,
     geojson_text::{self, Place, numbers, places},
 };
 use std::{
@@ -19,19 +19,19 @@ const BOX_OF_ALL: &[u8] = b"\"bbox\":";
 /// and with adapted bounding boxes.
 pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
     let open =
-        |path| File::open(path).map(BufReader::new).map_err(|error| file_error("reading", path, error));
+        |path| File::open(path).map(BufReader::new).map_err(|error| file_error(Action::Reading, path, error));
     let (plain, marked) = (open(plain)?, open(marked)?);
     let written = File::create(file).and_then(|to| join(plain, marked, BufWriter::new(to)));
     match written {
         Err(error) if error.kind() == ErrorKind::InvalidData => Err(Error::MapChanged),
-        Err(error) => Err(file_error("writing", file, error).into()),
+        Err(error) => Err(file_error(Action::Writing, file, error).into()),
         Ok(()) => Ok(()),
     }
 }
 
 /// Returns whether foreign members of a feature hold geometries or bounding boxes.
 pub fn has_foreign_places(path: &Path) -> Result<bool> {
-    let failed = |error| file_error("reading", path, error);
+    let failed = |error| file_error(Action::Reading, path, error);
     let (mut file, mut line) = (File::open(path).map(BufReader::new).map_err(failed)?, Vec::new());
     while next(&mut file, &mut line).map_err(failed)? {
         if is_feature(&line) && geojson_text::has_foreign_places(&line) {

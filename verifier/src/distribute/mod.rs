@@ -14,6 +14,7 @@ mod flatgeobuf;
 mod geojson;
 mod moving;
 mod ogr2ogr;
+mod opening;
 mod plain;
 mod recipients;
 mod request;
@@ -115,7 +116,7 @@ fn run(
     marking::check_scale(&map, survey.crs.as_ref()).map_err(of_map)?;
     let threads = threads();
     let pool = ThreadPool::new(threads, || (), || ());
-    let pool = pool.map_err(|error| Error::Threads { reason: error.to_string() })?;
+    let pool = pool.map_err(|source| Error::Threads { source })?;
     progress.start("patches", 0);
     let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
     let message = copies[0].carried(key);

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{Error, Result};
 use meshmark_dataset::{
-    file_error,
+    Action, file_error,
     geopackage::{self, Bounds},
     wkb::WkbError,
 };
@@ -19,7 +19,7 @@ const BEGIN: &str = "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN"
 
 /// Writes a copy whose vertices are at the places `to`, CRS units.
 pub fn write(staged: &Staged, path: &Path, to: &[[f64; 2]]) -> Result<()> {
-    fs::copy(&staged.path, path).map_err(|error| file_error("writing", path, error))?;
+    fs::copy(&staged.path, path).map_err(|error| file_error(Action::Writing, path, error))?;
     let moved = || -> Done<()> {
         let connection = open(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         connection.execute_batch(BEGIN)?;
@@ -33,7 +33,7 @@ pub fn write(staged: &Staged, path: &Path, to: &[[f64; 2]]) -> Result<()> {
         connection.execute_batch("COMMIT")?;
         connection.close().map_err(|(_, error)| error.into())
     };
-    moved().map_err(|error| Error::NotWritten { what: "a copy".into(), reason: error.to_string() })
+    moved().map_err(|cause| Error::unwritten("a copy", cause))
 }
 
 /// Moves the geometries of a layer. Returns the bounding boxes of the features that have one,

@@ -5,7 +5,7 @@
 use super::{flatgeobuf, geojson, moving, ogr2ogr, staged::Staged};
 use crate::{Error, Result};
 use meshmark_dataset::{
-    file_error,
+    Action, file_error,
     formats::Format,
     marking::{Moves, foreign_places},
 };
@@ -65,13 +65,13 @@ impl Plain {
             let path = path.with_extension("shx");
             path.metadata()
                 .map(|metadata| metadata.len())
-                .map_err(|error| file_error("reading", &path, error))
+                .map_err(|error| file_error(Action::Reading, &path, error))
         };
         if size(&self.path)? != size(geometries)? {
             return Err(Error::MapChanged);
         }
         let folder = self.path.parent().expect("it is in a folder");
-        let entries = fs::read_dir(folder).map_err(|error| file_error("reading", folder, error))?;
+        let entries = fs::read_dir(folder).map_err(|error| file_error(Action::Reading, folder, error))?;
         for entry in entries.flatten() {
             let path = entry.path();
             let extension = path.extension().unwrap_or_default();
@@ -80,7 +80,7 @@ impl Plain {
                 false => path.clone(),
             };
             let to = file.with_extension(extension);
-            fs::copy(&from, &to).map_err(|error| file_error("writing", &to, error))?;
+            fs::copy(&from, &to).map_err(|error| file_error(Action::Writing, &to, error))?;
         }
         Ok(())
     }

@@ -41,7 +41,7 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
     let bad = |reason: String| Error::Recipients { path: path.into(), reason };
     let mut bytes = Vec::new();
     let file = File::open(path).and_then(|file| file.take(LONGEST_LIST + 1).read_to_end(&mut bytes));
-    file.map_err(|error| bad(format!("cannot be read: {error}")))?;
+    file.map_err(|source| Error::TextUnread { what: "list of recipients", path: path.into(), source })?;
     if bytes.len() as u64 > LONGEST_LIST {
         return Err(bad(format!("is longer than {} MiB: split it", LONGEST_LIST >> 20)));
     }

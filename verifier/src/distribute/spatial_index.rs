@@ -5,6 +5,7 @@
 //! leaves up. This takes a small part of the time of a new tree.
 
 use super::staged::{Done, Layer};
+use crate::Cause;
 use meshmark_dataset::geopackage::Bounds;
 use rusqlite::{Connection, blob::Blob};
 
@@ -37,15 +38,19 @@ fn fit_node(nodes: &mut Blob, number: i64, levels: u16, bounds: &[(i64, Bounds)]
     nodes.reopen(number)?;
     let mut bytes = vec![0; nodes.len()];
     nodes.read_at_exact(&mut bytes, 0)?;
-    let (header, cells) =
-        bytes.split_first_chunk_mut::<HEADER>().ok_or("a node of the index is cut short")?;
+    let (header, cells) = bytes
+        .split_first_chunk_mut::<HEADER>()
+        .ok_or(Cause::SpatialIndex("a node of the index is cut short"))?;
     let count = u16::from_be_bytes([header[2], header[3]]);
     let mut whole = NOTHING;
     for cell in cells.chunks_exact_mut(CELL).take(usize::from(count)) {
         let (id, stored) = cell.split_first_chunk_mut::<8>().expect("a cell begins with its id");
         let id = i64::from_be_bytes(*id);
         let fitted = match levels {
-            0 => outward(of_feature(bounds, id).ok_or("the index has a feature without geometry")?),
+            0 => outward(
+                of_feature(bounds, id)
+                    .ok_or(Cause::SpatialIndex("the index has a feature without geometry"))?,
+            ),
             _ => fit_node(nodes, id, levels - 1, bounds)?,
         };
         stored.copy_from_slice(fitted.map(f32::to_be_bytes).as_flattened());

@@ -1,17 +1,14 @@
 //! The staged GeoPackage: the unmarked map that all copies start from, with the vertex of every
 //! coordinate.
 
-use crate::{Error, Result};
+use crate::{Cause, Error, Result};
 use meshmark_core::vertices::VertexTable;
 use meshmark_dataset::{geojson_text::without_places, geopackage, marking::NotMoved};
 use rusqlite::{Connection, OpenFlags};
-use std::{
-    error,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 /// The result of a step in which SQLite or a geometry can fail.
-pub type Done<T> = std::result::Result<T, Box<dyn error::Error>>;
+pub type Done<T> = std::result::Result<T, Cause>;
 
 /// A GeoPackage made by `ogr2ogr`.
 pub struct Staged {
@@ -47,10 +44,9 @@ impl Staged {
             let names = names.into_iter().filter(|(name, _)| marked(name));
             names.map(|(name, column)| Layer::read(&connection, name, column, vertices)).collect()
         };
-        match clear_native_data(&path).and_then(|()| layers()) {
-            Ok(layers) => Ok(Staged { layers, path }),
-            Err(error) => Err(Error::StagedUnread { reason: error.to_string() }),
-        }
+        clear_native_data(&path).map_err(|cause| Error::unwritten(path.display(), cause))?;
+        let layers = layers().map_err(|source| Error::StagedUnread { source })?;
+        Ok(Staged { layers, path })
     }
 
     /// Returns the layer of this name, if its geometries move.
@@ -72,7 +68,7 @@ impl Layer {
         while let Some(row) = rows.next()? {
             fids.push(row.get(0)?);
             bytes.clear();
-            bytes.extend_from_slice(row.get_ref(1)?.as_blob()?);
+            bytes.extend_from_slice(row.get_ref(1)?.as_blob().map_err(rusqlite::Error::from)?);
             geopackage::map_coordinates::<NotMoved>(&mut bytes, &mut |point| {
                 let vertex = table.index_of(point).ok_or(NotMoved::UnknownVertex(point))?;
                 vertices.push(vertex as u32);

@@ -42,9 +42,8 @@ impl Stage {
         } else {
             let plain = Plain::new((&request.map, &layers[0]), &workplace.subfolder("plain")?, format, warn)?;
             let failed = |error| maps::failed("map", &request.map, error);
-            copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path).map_err(
-                |error| Error::NotWritten { what: path.display().to_string(), reason: error.to_string() },
-            )?;
+            copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path)
+                .map_err(|error| Error::unwritten(path.display(), error))?;
             (Staged::read(path, &map.data.vertices, |_| true)?, Some(plain))
         };
         let geometries = map.geometries.as_ref().expect("the map was read with them");

@@ -1,11 +1,11 @@
 //! Writing of a copy: it is written, read back and published.
 
-use super::{copies::MarkedCopy, moving, staging::Stage};
+use super::{copies::MarkedCopy, moving, opening::open, staging::Stage};
 use crate::{
-    Error, Result,
+    Result,
     inputs::gdal_failures::{forget_failure, last_failure},
 };
-use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
+use gdal::vector::LayerAccess;
 use meshmark_core::{
     key::SecretKey,
     options::Options,
@@ -13,7 +13,7 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Error as MapError, file_error,
+    Action, Error as MapError, file_error,
     formats::Format,
     marking::{self, Moves, Unmarked},
     publication::{Move, Publication},
@@ -100,10 +100,10 @@ fn publish(
     let is_there = fs::read(&copy.record).is_ok_and(|bytes| bytes == record.as_bytes());
     if !is_there {
         let staged = workplace.folder().join("record.json");
-        fs::write(&staged, record).map_err(|error| file_error("writing", &staged, error))?;
+        fs::write(&staged, record).map_err(|error| file_error(Action::Writing, &staged, error))?;
         publication.companions.push(Move { from: staged, to: place(copy.record.file_name()) });
     }
-    let entries = fs::read_dir(folder).map_err(|error| file_error("reading", folder, error))?;
+    let entries = fs::read_dir(folder).map_err(|error| file_error(Action::Reading, folder, error))?;
     for entry in entries.flatten() {
         if entry.path().is_dir() {
             return Err(MapError::Folder { driver: format.driver }.into());
@@ -115,17 +115,4 @@ fn publish(
         }
     }
     Ok(publication.run(workplace.folder())?)
-}
-
-fn open(path: &Path, driver: &str) -> Result<Dataset> {
-    let options = DatasetOptions {
-        open_flags: GdalOpenFlags::GDAL_OF_READONLY | GdalOpenFlags::GDAL_OF_VECTOR,
-        allowed_drivers: Some(&[driver]),
-        ..DatasetOptions::default()
-    };
-    forget_failure();
-    Dataset::open_ex(path, options).map_err(|error| {
-        let reason = last_failure().unwrap_or_else(|| error.to_string());
-        Error::NotWritten { what: path.display().to_string(), reason }
-    })
 }

@@ -1,6 +1,6 @@
 //! The page frame: converts CRS units to whole page units, 4000 along the longer side.
 
-use crate::report::sketch::Extent;
+use crate::report::Extent;
 use maud::{Markup, html};
 use meshmark_detection::round_up;
 use std::fmt::Write as _;

@@ -1,7 +1,7 @@
 //! The message bit by bit, with the odds of each bit.
 
 use super::page::{count, figure, section, sentence};
-use crate::report::{Report, text::certainty};
+use crate::report::Report;
 use maud::{Markup, html};
 use meshmark_core::message::Message;
 
@@ -38,9 +38,9 @@ fn decoded(report: &Report, message: &str) -> Markup {
                 _ => { "; no message was expected. " }
             }
             @if let Some(how) = report.decoding() { (sentence(&format!("How it was decoded: {how}."))) }
-            @match report.shows_mark() {
-                true => { "Bits: " (certainty(&report.bits)) "." }
-                false => { "No mark of this key shows, so these bits are no better than guessed: noise, too, reads as some message." }
+            @match report.certainty_of_mark() {
+                Some(certainty) => { "Bits: " (certainty) "." }
+                None => { "No mark of this key shows, so these bits are no better than guessed: noise, too, reads as some message." }
             }
         }
         (figure(&bits(report), &legend(report)))

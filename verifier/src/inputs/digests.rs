@@ -34,22 +34,44 @@ pub struct Digested {
     pub digest: String,
 }
 
-impl Inputs {
+/// The digests of all files that a verification may use.
+pub struct Digests<'a> {
+    key: Digested,
+    references: Vec<(&'a Path, Digested)>,
+    suspect: Digested,
+    record: Option<Digested>,
+}
+
+impl<'a> Digests<'a> {
     /// Digests the files.
     ///
     /// # Errors
     /// Fails when one of them cannot be read to its end.
-    pub fn read(key: &Path, reference: &Path, suspect: &Path) -> Result<Self> {
-        let (key, reference, suspect) = (digest(key)?, digest(reference)?, digest(suspect)?);
-        Ok(Inputs { key, reference, suspect, record: None })
+    pub fn read(
+        key: &Path,
+        references: &'a [PathBuf],
+        suspect: &Path,
+        record: Option<&Path>,
+    ) -> Result<Self> {
+        let references = references.iter().map(|path| Ok((path.as_path(), digest(path)?)));
+        Ok(Digests {
+            key: digest(key)?,
+            references: references.collect::<Result<_>>()?,
+            suspect: digest(suspect)?,
+            record: record.map(digest).transpose()?,
+        })
     }
 
-    /// Adds the digest of the record.
+    /// Returns the files of a verification with this reference, and with this one of many records.
     ///
     /// # Errors
-    /// Fails when the record is no longer readable.
-    pub fn with_record(self, record: Option<&Path>) -> Result<Self> {
-        Ok(Inputs { record: record.map(digest).transpose()?, ..self })
+    /// Fails when that record is no longer readable.
+    pub fn of_verification(self, reference: &Path, best_record: Option<&Path>) -> Result<Inputs> {
+        let Digests { key, references, suspect, record } = self;
+        let best_record = best_record.map(digest).transpose()?;
+        let reference = references.into_iter().find(|(path, _)| *path == reference);
+        let (_, reference) = reference.expect("the verification has one of the references");
+        Ok(Inputs { key, reference, suspect, record: record.or(best_record) })
     }
 }
 

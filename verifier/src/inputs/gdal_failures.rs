@@ -1,6 +1,7 @@
 //! GDAL's failure messages: kept, and included in the messages of this crate.
 
-use std::cell::RefCell;
+use gdal::errors::GdalError;
+use std::{cell::RefCell, error, fmt};
 
 thread_local! {
     /// Keeps GDAL's last error message on this thread.
@@ -15,6 +16,36 @@ pub fn quieten_gdal() {
             LAST_FAILURE.set(Some(message.to_string()));
         }
     });
+}
+
+/// A failure of a function of GDAL. Its message on this thread is more exact than the error of the
+/// function.
+#[derive(Debug)]
+pub struct GdalFailure {
+    message: Option<String>,
+    source: Box<GdalError>,
+}
+
+impl GdalFailure {
+    /// Adds the last message since [`forget_failure`].
+    pub(crate) fn new(source: GdalError) -> Self {
+        GdalFailure { message: last_failure(), source: Box::new(source) }
+    }
+}
+
+impl fmt::Display for GdalFailure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match &self.message {
+            Some(message) => f.write_str(message),
+            None => self.source.fmt(f),
+        }
+    }
+}
+
+impl error::Error for GdalFailure {
+    fn source(&self) -> Option<&(dyn error::Error + 'static)> {
+        Some(&*self.source)
+    }
 }
 
 /// Returns GDAL's last error message on this thread since [`forget_failure`].

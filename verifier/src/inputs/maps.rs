@@ -1,12 +1,12 @@
 //! Maps: references, and maps that are marked or compared.
 
-use super::gdal_failures::{forget_failure, last_failure};
+use super::gdal_failures::{GdalFailure, forget_failure, last_failure};
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{ground::Ground, options::Options, scale::ScaleLattice};
 use meshmark_dataset::{
-    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, TargetCrs, features,
-    marked_view, marking, survey,
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, features, marked_view,
+    marking, survey,
 };
 use std::{collections::BTreeSet, path::Path};
 
@@ -28,7 +28,7 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     if let LabelFields::Named(names) = reading.landmarks {
         check_fields(path, &dataset, names)?;
     }
-    read("reference", path, &dataset, reading, TargetCrs::Own)
+    read("reference", path, &dataset, reading)
 }
 
 /// Opens a map for marking, and reads its vertices.
@@ -43,7 +43,7 @@ pub(crate) fn source(
     let dataset = open("map", path)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
-    let survey = read("map", path, &dataset, &reading, TargetCrs::Own)?;
+    let survey = read("map", path, &dataset, &reading)?;
     marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
     Ok((dataset, survey))
 }
@@ -92,16 +92,15 @@ fn open(what: &'static str, path: &Path) -> Result<Dataset> {
     if holds_password(path) {
         return Err(Error::Password { what });
     }
-    open_with(path, None, &[]).map_err(|reason| Error::Unopened { what, path: path.into(), reason })
+    open_with(path, None, &[]).map_err(|source| Error::Unopened { what, path: path.into(), source })
 }
 
 /// Opens a dataset with these drivers, all without names, and with open options beside the usual ones.
-/// The error is GDAL's reason.
 pub(super) fn open_with(
     path: &Path,
     allowed_drivers: Option<&[&str]>,
     options: &[String],
-) -> std::result::Result<Dataset, String> {
+) -> std::result::Result<Dataset, GdalFailure> {
     forget_failure();
     let mut open_options = marking::OPEN_OPTIONS.to_vec();
     open_options.push("@WRITE_GFS=NO"); // reading a map creates no file beside it
@@ -112,7 +111,7 @@ pub(super) fn open_with(
         allowed_drivers,
         ..Default::default()
     };
-    Dataset::open_ex(path, options).map_err(|error| last_failure().unwrap_or_else(|| error.to_string()))
+    Dataset::open_ex(path, options).map_err(GdalFailure::new)
 }
 
 /// Returns whether the connection string of a database holds its password: as `password=…`, `pwd=…`
@@ -127,32 +126,20 @@ fn holds_password(path: &Path) -> bool {
             || of_url().is_some_and(|(user, _)| user.contains(':')))
 }
 
-pub(super) fn read(
-    what: &'static str,
-    path: &Path,
-    dataset: &Dataset,
-    reading: &Reading,
-    target: TargetCrs,
-) -> Result<Survey> {
-    survey_of(dataset, reading, target).map_err(|error| failed(what, path, error))
+fn read(what: &'static str, path: &Path, dataset: &Dataset, reading: &Reading) -> Result<Survey> {
+    forget_failure();
+    survey(dataset, &selection(reading)).map_err(|error| failed(what, path, error))
 }
 
-pub(super) fn survey_of(
-    dataset: &Dataset,
-    reading: &Reading,
-    target: TargetCrs,
-) -> meshmark_dataset::Result<Survey> {
-    forget_failure();
-    let selection = Selection {
+pub(super) fn selection<'a>(reading: &Reading<'a>) -> Selection<'a> {
+    Selection {
         layers: reading.layers,
         srs: reading.srs,
         labels: reading.landmarks,
-        target,
         geometries: reading.geometries,
         most_vertices: MOST_VERTICES,
         last_failure: &last_failure,
-    };
-    survey(dataset, &selection)
+    }
 }
 
 pub(crate) fn failed(what: &'static str, path: &Path, source: meshmark_dataset::Error) -> Error {

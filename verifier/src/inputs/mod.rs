@@ -1,5 +1,5 @@
-//! Inputs: maps, suspects, keys and records, read with errors that name the file, and the digests
-//! of the files.
+//! Inputs: maps, suspects, keys and records, read with errors that name the file, the digests of
+//! the files, and the versions of the programs that read them.
 
 pub mod digests;
 pub mod gdal_failures;
@@ -9,3 +9,5 @@ pub mod suspects;
 mod svg;
 mod tables;
 pub mod texts;
+pub mod unsuitable;
+pub mod versions;

@@ -1,5 +1,9 @@
 //! The formats of suspects: those that are read, and the command that converts any other.
 
+use super::{
+    gdal_failures::GdalFailure,
+    unsuitable::{BadDrawing, Unsuitable},
+};
 use crate::{Error, words::quoted};
 use gdal::{DriverManager, Metadata};
 use std::path::{Path, PathBuf};
@@ -76,51 +80,51 @@ pub(super) fn check(path: &Path) -> Result<(), Error> {
     let is_format = |format: &&Format| format.endings.iter().any(|ending| name.ends_with(ending));
     let Some(Format { name, driver, .. }) = FORMATS.iter().find(is_format) else { return Ok(()) };
     let (reason, place) = match driver {
-        None => (format!("is {name}, which is not read as a suspect"), ""),
-        Some(driver) if !reads(driver) => (
-            format!("is {name}, and this GDAL has no {driver} driver"),
-            " on a machine whose GDAL has this driver",
-        ),
+        None => (Unsuitable::Format { name }, ""),
+        Some(driver) if !reads(driver) => {
+            (Unsuitable::NoDriver { name, driver }, " on a machine whose GDAL has this driver")
+        }
         Some(_) => return Ok(()),
     };
-    Err(Error::Unconverted { path: path.into(), reason, command: conversion(path), place })
+    Err(Error::Unconverted { path: path.into(), reason: Box::new(reason), command: conversion(path), place })
 }
 
-/// Returns the error for a suspect that no driver opens, with the reason that GDAL gives.
-pub(super) fn unopened(path: &Path, reason: &str) -> Error {
+/// Returns the error for a suspect that no driver opens.
+pub(super) fn unopened(path: &Path, source: GdalFailure) -> Error {
     let name = file_name(path);
     let lower = name.to_lowercase();
     let shown = word(path);
     let (reason, command) = if lower.ends_with(".svgz") {
-        ("is a compressed SVG file".into(), format!("gunzip -c {shown} > {}", word(&renamed(path, "svg"))))
+        (Unsuitable::CompressedDrawing, format!("gunzip -c {shown} > {}", word(&renamed(path, "svg"))))
     } else if lower.ends_with(".gz") {
-        ("is a compressed file".into(), format!("gunzip -k {shown}"))
+        (Unsuitable::Compressed, format!("gunzip -k {shown}"))
     } else if lower.ends_with(".zip") {
-        (format!("cannot be opened as a zip file ({reason})"), format!("unzip {shown}"))
+        (Unsuitable::Zip { source }, format!("unzip {shown}"))
     } else if drivers().into_iter().any(|driver| has_ending(driver, &lower)) {
-        return Error::Unopened { what: "suspect", path: path.into(), reason: reason.into() }; // a broken file
+        return Error::Unopened { what: "suspect", path: path.into(), source }; // a broken file
     } else {
         let known = drivers().join(", ");
-        (format!("cannot be opened: {reason} (a suspect may be SVG, {known})"), conversion(path))
+        (Unsuitable::Unopened { source, known }, conversion(path))
     };
-    Error::Unconverted { path: path.into(), reason, command, place: "" }
+    unconverted(path, reason, command)
 }
 
 /// Returns the error for an SVG file that is refused.
-pub(super) fn unread_drawing(path: &Path, reason: String) -> Error {
+pub(super) fn unread_drawing(path: &Path, reason: BadDrawing) -> Error {
     let copy = word(&renamed(path, "svg"));
     let command = format!("inkscape --export-plain-svg --export-filename={copy} {}", word(path));
-    Error::Unconverted { path: path.into(), reason, command, place: "" }
+    unconverted(path, reason.into(), command)
 }
 
 /// Returns the error for a table in which no column is recognised as coordinates.
 pub(super) fn table_without_coordinates(path: &Path) -> Error {
     let options = "-oo X_POSSIBLE_NAMES=column -oo Y_POSSIBLE_NAMES=column";
     let command = format!("{} {options}", conversion(path));
-    let reason =
-        "has no column that is known to hold coordinates (WKT, x and y, lon and lat, easting and northing)"
-            .into();
-    Error::Unconverted { path: path.into(), reason, command, place: "" }
+    unconverted(path, Unsuitable::NoCoordinates, command)
+}
+
+fn unconverted(path: &Path, reason: Unsuitable, command: String) -> Error {
+    Error::Unconverted { path: path.into(), reason: Box::new(reason), command, place: "" }
 }
 
 /// Returns the command that converts a suspect to a GeoPackage.

@@ -1,12 +1,13 @@
 //! Suspects, which may be manipulated: only local files of plain formats are read, without network.
 
 use super::{
-    maps::{Reading, failed, first_crs, open_with, read, survey_of},
+    gdal_failures::{GdalFailure, forget_failure},
+    maps::{Reading, failed, first_crs, open_with, selection},
     suspect_formats, svg, tables,
 };
-use crate::{Error, Result, words::printable};
+use crate::{Cause, Error, Result, words::printable};
 use gdal::{Dataset, vector::LayerAccess};
-use meshmark_dataset::{CoordinateSystem, Survey, TargetCrs};
+use meshmark_dataset::{CoordinateSystem, LabelFields, Numbers, Survey, numbers};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -15,52 +16,51 @@ use std::{
 /// A suspect after reading.
 pub struct Suspect {
     /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
-    /// in its own.
+    /// in its own; otherwise the numbers of the file.
     pub map: Survey,
-    /// Whether the coordinates of `map` are unchanged from the file.
-    pub is_raw: bool,
+    /// The numbers of the file, where `map` is in the CRS of the reference.
+    pub numbers: Option<Numbers>,
     /// CRS of the layers.
     pub layer_crs: Vec<String>,
     /// The first CRS of a layer.
     pub crs: Option<CoordinateSystem>,
 }
 
+/// A suspect is read whole, with all its attributes.
+const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
+
 /// Reads the suspect in the CRS of the reference, where both are known. Where reprojection fails,
-/// it reads the coordinates unchanged.
-pub fn suspect(path: &Path, reading: &Reading, reference: &Survey) -> Result<Suspect> {
+/// the coordinates stay unchanged.
+pub fn suspect(path: &Path, reference: &Survey) -> Result<Suspect> {
     let dataset = open_suspect(path)?;
-    let layer_crs = crs_of(&dataset);
-    let crs = first_crs(&dataset);
+    let (layer_crs, crs) = (crs_of(&dataset), first_crs(&dataset));
+    let failed = |error| failed("suspect", path, error);
+    forget_failure();
+    let numbers = numbers(&dataset, &selection(&WHOLE)).map_err(failed)?;
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
-        match survey_of(&dataset, reading, TargetCrs::Crs(target)) {
-            Ok(map) => return Ok(Suspect { map, is_raw: false, layer_crs, crs }),
+        match numbers.in_crs(target) {
+            Ok(map) => return Ok(Suspect { map, numbers: Some(numbers), layer_crs, crs }),
             // PROJ fails, or the map exceeds its limits, when the CRS is not that of the
             // coordinates.
             Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
-            Err(error) => return Err(failed("suspect", path, error)),
+            Err(error) => return Err(failed(error)),
         }
     }
-    let map = read("suspect", path, &dataset, reading, TargetCrs::Raw)?;
-    Ok(Suspect { map, is_raw: true, layer_crs, crs })
-}
-
-/// Reads the coordinates of the suspect unchanged.
-pub fn raw_suspect(path: &Path, reading: &Reading) -> Result<Survey> {
-    read("suspect", path, &open_suspect(path)?, reading, TargetCrs::Raw)
+    Ok(Suspect { map: numbers.raw().map_err(failed)?, numbers: None, layer_crs, crs })
 }
 
 fn open_suspect(path: &Path) -> Result<Dataset> {
     if !path.is_file() && !path.is_dir() {
         return Err(Error::NoFile { path: path.into() });
     }
-    forbid_network().map_err(|error| Error::NoOption { reason: error.to_string() })?;
+    forbid_network().map_err(|source| Error::NoOption { source })?;
     check_table(path)?;
     suspect_formats::check(path)?;
     if svg::is_named(path) {
         return svg::open(path);
     }
     let place = highest_zoom(path).unwrap_or_else(|| path.into());
-    let dataset = open_plain(&place, &[]).map_err(|reason| suspect_formats::unopened(path, &reason))?;
+    let dataset = open_plain(&place, &[]).map_err(|failure| suspect_formats::unopened(path, failure))?;
     check_plain(path, &dataset)?;
     if dataset.driver().short_name() == "CSV" && tables::is_without_geometry(&dataset) {
         return open_table(path, &dataset);
@@ -68,7 +68,7 @@ fn open_suspect(path: &Path) -> Result<Dataset> {
     Ok(dataset)
 }
 
-fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, String> {
+fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, GdalFailure> {
     open_with(path, Some(&suspect_formats::drivers()), options)
 }
 
@@ -76,7 +76,7 @@ fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, S
 fn open_table(path: &Path, table: &Dataset) -> Result<Dataset> {
     let options =
         tables::open_options(table).ok_or_else(|| suspect_formats::table_without_coordinates(path))?;
-    open_plain(path, &options).map_err(|reason| suspect_formats::unopened(path, &reason))
+    open_plain(path, &options).map_err(|failure| suspect_formats::unopened(path, failure))
 }
 
 /// Returns the folder of the highest zoom of a folder of tiles, named z/x/y.pbf.
@@ -145,10 +145,10 @@ const VIRTUAL_TABLES: &str = "SELECT name, sql FROM sqlite_master WHERE sql LIKE
 
 /// Refuses a database with virtual tables that take their rows from elsewhere.
 fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
-    let failed = |reason: String| Error::Unread { path: path.into(), reason };
+    let failed = |cause: Cause| Error::Unread { path: path.into(), source: Box::new(cause) };
     let tables = match dataset.driver().short_name().as_str() {
-        "GPKG" | "SQLite" => virtual_tables(dataset).map_err(|error| failed(error.to_string()))?,
-        "MBTiles" => virtual_tables_of_tiles(path).map_err(|error| failed(error.to_string()))?,
+        "GPKG" | "SQLite" => virtual_tables(dataset).map_err(|error| failed(error.into()))?,
+        "MBTiles" => virtual_tables_of_tiles(path).map_err(|error| failed(error.into()))?,
         _ => return Ok(()),
     };
     match tables.into_iter().find(|(_, sql)| !is_plain(sql)) {

@@ -3,7 +3,7 @@
 //! Coordinates are those of the drawing, y downwards; the registration finds where they lie. Nothing outside the
 //! file is read.
 
-use super::suspect_formats;
+use super::{suspect_formats, unsuitable::BadDrawing};
 use crate::{Error, Result};
 use gdal::{
     Dataset, DriverManager,
@@ -39,8 +39,7 @@ const WIDTH: f64 = 1600.0;
 /// An outline: one point is a place, and a closed line repeats its first point.
 type Line = Vec<[f64; 2]>;
 
-/// What a drawing is refused for; completes the sentence "the suspect …".
-type Refused<T> = std::result::Result<T, String>;
+type Refused<T> = std::result::Result<T, BadDrawing>;
 
 /// Returns whether the name of a file is that of a drawing.
 pub(super) fn is_named(path: &Path) -> bool {
@@ -49,18 +48,17 @@ pub(super) fn is_named(path: &Path) -> bool {
 
 /// Reads a drawing as a dataset without CRS.
 pub(super) fn open(path: &Path) -> Result<Dataset> {
-    let refused = |reason| suspect_formats::unread_drawing(path, reason);
+    let refused = |reason: BadDrawing| suspect_formats::unread_drawing(path, reason);
     let lines = text(path).and_then(|text| lines(&text)).map_err(refused)?;
-    dataset(&lines).map_err(|error| Error::Unread { path: path.into(), reason: error.to_string() })
+    dataset(&lines).map_err(|error| Error::Unread { path: path.into(), source: Box::new(error.into()) })
 }
 
 fn text(path: &Path) -> Refused<String> {
-    let failed = |error: std::io::Error| format!("cannot be read ({error})");
-    let size = path.metadata().map_err(failed)?.len();
+    let size = path.metadata()?.len();
     if size > MOST_BYTES {
-        return Err(format!("has {size} bytes, where an SVG file may have {MOST_BYTES}"));
+        return Err(format!("has {size} bytes, where an SVG file may have {MOST_BYTES}").into());
     }
-    String::from_utf8(std::fs::read(path).map_err(failed)?).map_err(|_| "is not encoded as UTF-8".into())
+    String::from_utf8(std::fs::read(path)?).map_err(|_| BadDrawing::NotUtf8)
 }
 
 fn dataset(lines: &[Line]) -> std::result::Result<Dataset, GdalError> {
@@ -83,8 +81,7 @@ fn dataset(lines: &[Line]) -> std::result::Result<Dataset, GdalError> {
 fn lines(text: &str) -> Refused<Vec<Line>> {
     check_declarations(text)?;
     let options = ParsingOptions { allow_dtd: true, nodes_limit: MOST_NODES, entity_resolver: None };
-    let document =
-        Document::parse_with_options(text, options).map_err(|error| format!("is no valid XML ({error})"))?;
+    let document = Document::parse_with_options(text, options)?;
     let root = document.root_element();
     if root.tag_name().name() != "svg" {
         return Err("is no SVG drawing: its root element is another".into());
@@ -103,7 +100,7 @@ fn check_declarations<'a>(text: &'a str) -> Refused<()> {
     let is_value = |rest: &str| rest.trim_start().starts_with(['"', '\'']);
     let attributes = |tag: &str| tag.split('=').skip(1).filter(|rest| is_value(rest)).count();
     if text.split('<').any(|tag| attributes(tag) > MOST_ATTRIBUTES) {
-        return Err(format!("has an element of more than {MOST_ATTRIBUTES} attributes"));
+        return Err(format!("has an element of more than {MOST_ATTRIBUTES} attributes").into());
     }
     let declarations = || text.match_indices("xmlns").map(|(at, _)| &text[at..]);
     let prefix = |rest: &'a str| rest.split(['=', '"', '\'', '<', '>']).next().unwrap_or_default().trim();
@@ -112,7 +109,8 @@ fn check_declarations<'a>(text: &'a str) -> Refused<()> {
     if prefixes.len() > most_prefixes || declarations().count() > most {
         return Err(format!(
             "has more than {most_prefixes} namespaces, or declares them more than {most} times"
-        ));
+        )
+        .into());
     }
     Ok(())
 }
@@ -141,9 +139,9 @@ impl Drawing {
         while let Some((node, around, uses)) = pending.pop() {
             elements += 1;
             if elements > MOST_POINTS || pending.len() > MOST_POINTS {
-                return Err(format!("draws more than {MOST_POINTS} elements"));
+                return Err(format!("draws more than {MOST_POINTS} elements").into());
             }
-            let transform = around.then_inner(Affine::of(node));
+            let transform = around.then_inner(Affine::of_node(node));
             match node.tag_name().name() {
                 "svg" | "g" | "a" | "switch" => {
                     pending.extend(node.children().rev().map(|child| (child, transform, uses)));
@@ -159,7 +157,7 @@ impl Drawing {
                         whole.into_iter().chain(content).map(|node| (node, transform, uses + 1))
                     }));
                 }
-                "use" => return Err(format!("has more than {MOST_USES} uses inside each other")),
+                "use" => return Err(format!("has more than {MOST_USES} uses inside each other").into()),
                 _ => self.shape(node, transform)?,
             }
         }
@@ -254,7 +252,7 @@ impl Drawing {
     /// Checks that so many points may be added. NaN is none.
     fn check(&self, more: f64) -> Refused<()> {
         let is_allowed = self.points as f64 + more <= MOST_POINTS as f64;
-        if is_allowed { Ok(()) } else { Err(format!("has more than {MOST_POINTS} points")) }
+        if is_allowed { Ok(()) } else { Err(format!("has more than {MOST_POINTS} points").into()) }
     }
 }
 
@@ -292,7 +290,7 @@ impl Affine {
     }
 
     /// Returns the transform of an element; one that is malformed changes nothing.
-    fn of(node: Node) -> Self {
+    fn of_node(node: Node) -> Self {
         let transform = node.attribute("transform").and_then(|text| Transform::from_str(text).ok());
         transform.map_or(Affine::IDENTITY, |Transform { a, b, c, d, e, f }| Affine([a, b, c, d, e, f]))
     }

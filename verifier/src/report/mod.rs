@@ -1,18 +1,19 @@
-//! The report: data and words. The examination of the suspect computes the data.
+//! The report: data and words. [`verify`](mod@crate::verify) computes the data, and
+//! [`outputs`](crate::outputs) writes the files.
 
 mod candidates;
 mod evidence;
 mod evidence_map;
 pub(crate) mod explain;
-mod report_file;
+mod extent;
 pub mod sketch;
-pub(crate) mod text;
+mod text;
 
 pub use candidates::{Candidates, Entry};
-pub use evidence::{Evidence, Provenance, command_line, versions};
-pub use evidence_map::{EvidenceMap, EvidenceMapFile};
+pub use evidence::{Evidence, Provenance};
+pub use evidence_map::{EvidenceMap, FoundVertex, PatchEvidence};
 pub use explain::explain;
-pub use report_file::{Format, ReportFile};
+pub use extent::Extent;
 
 use crate::ExitCode;
 use meshmark_core::{
@@ -83,6 +84,9 @@ pub struct Report {
     /// Number of messages that were tried.
     #[serde(skip)]
     pub tried: usize,
+    /// The certainty of `bits`; `None` when nothing was decoded.
+    #[serde(skip)]
+    pub certainty: Option<Certainty>,
     /// The expected message as the code carries it, hexadecimal.
     #[serde(skip)]
     pub expected_carried: Option<String>,
@@ -112,6 +116,17 @@ pub struct CodeEntry {
     pub parity_holds: Option<bool>,
     /// The decoder that found the message; null when nothing was decoded.
     pub decoder: Option<Decoder>,
+}
+
+/// The certainty of decoded bits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Certainty {
+    /// The smallest absolute log-likelihood ratio of a bit, natural logarithm.
+    pub weakest_llr: f64,
+    /// The median of the absolute ratios.
+    pub median_llr: f64,
+    /// Number of bits whose odds exceed 1000 to 1.
+    pub over_1000_to_1: usize,
 }
 
 /// Numbers of distinct vertices.

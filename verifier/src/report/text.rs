@@ -1,6 +1,6 @@
 //! The report as a short text.
 
-use super::Report;
+use super::{Certainty, Report};
 use crate::words::power_of_ten;
 use meshmark_core::code::Decoder;
 use meshmark_detection::{
@@ -23,9 +23,9 @@ impl Report {
             lines.push(format!("message:      {message}{}{errors}", self.other_reading()));
             // Noise also decodes to a code word and bits, whose odds are valid only for a mark.
             lines.extend(self.decoding().map(|how| format!("code:         {how}")));
-            lines.push(match self.shows_mark() {
-                true => format!("bits:         {}", certainty(&self.bits)),
-                false => "bits:         no better than guessed, for no mark of this key shows".into(),
+            lines.push(match self.certainty_of_mark() {
+                Some(certainty) => format!("bits:         {certainty}"),
+                None => "bits:         no better than guessed, for no mark of this key shows".into(),
             });
         }
         lines.extend(self.p_value_lines());
@@ -111,6 +111,12 @@ impl Report {
         Some(format!("{}read by {how}", wrong.unwrap_or_default()))
     }
 
+    /// Describes the certainty of the bits of a visible mark.
+    pub(crate) fn certainty_of_mark(&self) -> Option<String> {
+        let certainty = self.certainty.filter(|_| self.shows_mark())?;
+        Some(certainty.to_text(self.bits.len()))
+    }
+
     /// Returns whether the decoded bits come from a mark rather than from noise.
     pub(crate) fn shows_mark(&self) -> bool {
         self.verdict == Verdict::Match || self.shows_key()
@@ -130,13 +136,16 @@ impl Report {
     }
 }
 
-/// Describes the certainty of the bits, given their log-likelihood ratios.
-pub(crate) fn certainty(bits: &[f64]) -> String {
-    let mut sure: Vec<f64> = bits.iter().map(|llr| llr.abs()).collect();
-    sure.sort_by(f64::total_cmp);
-    let beyond = sure.iter().filter(|llr| **llr > 1000f64.ln()).count();
-    let (weakest, median) = (odds(sure[0]), odds(sure[sure.len() / 2]));
-    format!("weakest right with odds {weakest}, median {median}; {beyond} of {} over 1000 to 1", bits.len())
+impl Certainty {
+    /// Describes the certainty of this number of bits.
+    fn to_text(self, bits: usize) -> String {
+        format!(
+            "weakest right with odds {}, median {}; {} of {bits} over 1000 to 1",
+            odds(self.weakest_llr),
+            odds(self.median_llr),
+            self.over_1000_to_1
+        )
+    }
 }
 
 /// Formats a log-likelihood ratio as odds, for example "1000 to 1".
@@ -150,7 +159,10 @@ mod tests {
 
     #[test]
     fn the_certainty_of_the_bits_is_in_odds() {
-        let text = certainty(&[-20.0, 2f64.ln(), 7.0, -7.5, 0.0]);
-        assert_eq!(text, "weakest right with odds 1.0 to 1, median 1096.6 to 1; 3 of 5 over 1000 to 1");
+        let certainty = Certainty { weakest_llr: 0.0, median_llr: 7.0, over_1000_to_1: 3 };
+        assert_eq!(
+            certainty.to_text(5),
+            "weakest right with odds 1.0 to 1, median 1096.6 to 1; 3 of 5 over 1000 to 1"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Checks that a record belongs to a key and a reference.
 
-use super::{references::is_made_from, request::Request};
+use super::request::Request;
 use crate::{Error, Result};
 use meshmark_core::{key::SecretKey, record::Record};
 use meshmark_dataset::Survey;
@@ -17,6 +17,11 @@ pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
         return Err(Error::OtherMessage);
     }
     Ok(())
+}
+
+/// Returns whether a record is of the reference whose vertices have this digest.
+pub fn is_made_from(record: &Record, digest: &str) -> bool {
+    record.reference.vertices_sha256 == digest
 }
 
 /// Checks that the record is of this reference, whose vertices have this digest: any other has

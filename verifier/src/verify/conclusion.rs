@@ -1,7 +1,7 @@
 //! The conclusion: a report on examination and decision, including all that needs the secret key.
 
 use super::{examination::Examination, request::Request};
-use crate::report::{CodeEntry, Evidence, Report, ReportParameters};
+use crate::report::{Certainty, CodeEntry, Evidence, Report, ReportParameters};
 use meshmark_core::{carrier::Carrier, demodulation::Demodulation, message::Message};
 use meshmark_detection::{
     Demodulator,
@@ -56,6 +56,7 @@ pub fn conclude(
         null_hypothesis: hypothesis.as_ref().map(|hypothesis| hypothesis.null),
         tried: decision.tried,
         bit_errors: decoded.as_ref().zip(expected).map(|(decoded, m)| decoded.message.errors(m)),
+        certainty: decoded.as_ref().and_then(|decoded| certainty(&decoded.message_llrs)),
         bits: decoded.map(|decoded| decoded.message_llrs).unwrap_or_default(),
         code,
         registration: seen.registration.clone(),
@@ -72,6 +73,17 @@ pub fn conclude(
             map.scored(scores)
         }),
     }
+}
+
+/// Returns the certainty of bits, given their log-likelihood ratios; `None` without bits.
+fn certainty(llrs: &[f64]) -> Option<Certainty> {
+    let mut sure: Vec<f64> = llrs.iter().map(|llr| llr.abs()).collect();
+    sure.sort_by(f64::total_cmp);
+    Some(Certainty {
+        weakest_llr: *sure.first()?,
+        median_llr: sure[sure.len() / 2],
+        over_1000_to_1: sure.iter().filter(|llr| **llr > 1000f64.ln()).count(),
+    })
 }
 
 fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters {
@@ -92,5 +104,17 @@ fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters 
         significance: request.significance,
         noise_m: seen.found.as_ref().ok().map(|found| found.noise_m),
         software: format!("meshmark {}", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_certainty_of_bits_does_not_depend_on_their_signs() {
+        let expected = Certainty { weakest_llr: 0.0, median_llr: 7.0, over_1000_to_1: 3 };
+        assert_eq!(certainty(&[-20.0, 2f64.ln(), 7.0, -7.5, 0.0]), Some(expected));
+        assert_eq!(certainty(&[]), None);
     }
 }

@@ -5,17 +5,9 @@
 //! with most matched vertices wins. No key is involved, so many attempts do not reduce the
 //! significance.
 
-use crate::{
-    Result,
-    inputs::{
-        maps::Reading,
-        suspects::{Suspect, raw_suspect},
-    },
-    words::printable,
-};
-use meshmark_dataset::{Assumption, Survey, likely_assumptions, overlaps};
+use crate::{inputs::suspects::Suspect, words::printable};
+use meshmark_dataset::{Assumption, Numbers, Survey, likely_assumptions, overlaps};
 use meshmark_detection::registration::{ReadAs, Registrar, Registration, Start};
-use std::path::Path;
 
 /// A suspect and its registration.
 pub struct Registered {
@@ -29,15 +21,15 @@ pub struct Registered {
 /// with the reference.
 ///
 /// # Errors
-/// Fails when the suspect cannot be read a second time.
+/// Fails when the suspect has too many coordinates.
 pub fn register(
     registrar: &Registrar,
     reference: &Survey,
     suspect: Suspect,
-    (file, reading): (&Path, &Reading),
     start: Start,
-) -> Result<Registered> {
-    let Suspect { map, is_raw, crs, .. } = suspect;
+) -> meshmark_dataset::Result<Registered> {
+    let Suspect { map, numbers, crs, .. } = suspect;
+    let is_raw = numbers.is_none();
     let doubtful = is_raw || !overlaps(&map, reference);
     let at_first = match start {
         Start::None => registrar.as_it_stands(&map.data),
@@ -54,8 +46,8 @@ pub fn register(
     if start == Start::None || plain.agrees() || !doubtful && plain.registration.agrees_in_part() {
         return Ok(plain);
     }
-    let again = if is_raw { None } else { Some(raw_suspect(file, reading)?) };
-    let raw = again.as_ref().unwrap_or(&plain.map);
+    let raw = numbers.map(Numbers::raw).transpose()?;
+    let raw = raw.as_ref().unwrap_or(&plain.map);
     let assumptions = likely_assumptions(raw, crs.as_ref(), reference);
     let assumed = in_place(registrar, reference, raw, &assumptions);
     if start == Start::Auto && assumed.as_ref().is_some_and(Registered::agrees) {

@@ -2,6 +2,7 @@
 
 use super::{
     crs_search::{self, Registered},
+    drawing,
     request::Request,
 };
 use crate::{
@@ -11,13 +12,10 @@ use crate::{
         suspects::{self, Suspect},
     },
     progress::Progress,
-    report::{
-        EvidenceMap, VertexCounts,
-        sketch::{Scene, Sketch},
-    },
+    report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
 use meshmark_core::demodulation::Demodulation;
-use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
+use meshmark_dataset::{CoordinateSystem, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Observations, Reference,
     decision::{Decision, Decoys, Expected, decide_among},
@@ -58,23 +56,23 @@ pub struct Examination {
 ///
 /// # Errors
 /// Fails when it cannot be read.
-pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Fit<Survey>> {
+pub fn read_reference(request: &Request, progress: &mut Progress) -> Result<Suited<Survey>> {
     progress.start("reading", 0);
     let (layers, srs) = (request.layers.as_deref(), request.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: request.landmarks(), geometries: false };
     match maps::reference(&request.reference, &reading) {
-        Ok(reference) => Ok(Fit::Fits(reference)),
-        Err(error) if error.is_about_options() => Ok(Fit::Unfit(error)),
+        Ok(reference) => Ok(Suited::Yes(reference)),
+        Err(error) if error.is_about_options() => Ok(Suited::No(error)),
         Err(error) => Err(error),
     }
 }
 
-/// The fit of a reference to a request.
-pub enum Fit<T> {
+/// A value, if the reference is suited to the request.
+pub enum Suited<T> {
     /// A map made from the reference may carry the mark of the request.
-    Fits(T),
+    Yes(T),
     /// The reference does not allow the mark; the error holds the reason.
-    Unfit(Error),
+    No(Error),
 }
 
 impl Examination {
@@ -88,15 +86,15 @@ impl Examination {
     }
 }
 
-impl<T> Fit<T> {
+impl<T> Suited<T> {
     /// Returns the value, for a request that names this very reference.
     ///
     /// # Errors
     /// Fails when the reference does not fit.
     pub fn or_fail(self) -> Result<T> {
         match self {
-            Fit::Fits(found) => Ok(found),
-            Fit::Unfit(error) => Err(error),
+            Suited::Yes(found) => Ok(found),
+            Suited::No(error) => Err(error),
         }
     }
 }
@@ -105,9 +103,13 @@ impl<T> Fit<T> {
 ///
 /// # Errors
 /// Fails when the suspect is unreadable.
-pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Fit<Examination>> {
+pub fn examine(
+    request: &Request,
+    reference: &Survey,
+    progress: &mut Progress,
+) -> Result<Suited<Examination>> {
     let unfit =
-        |source| Fit::Unfit(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
+        |source| Suited::No(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
     let map = match reference.map() {
         Ok(map) => map,
         Err(error) => return Ok(unfit(error)),
@@ -128,15 +130,12 @@ pub fn examine(request: &Request, reference: &Survey, progress: &mut Progress) -
         Err(error) => return Ok(unfit(error.into())),
     };
     let crs = reference.crs.as_ref();
-    Ok(Fit::Fits(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
+    Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
 }
-
-/// A suspect is read whole, with all its attributes.
-const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
 
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
     progress.start("reading", 0);
-    suspects::suspect(&request.suspect, &WHOLE, reference)
+    suspects::suspect(&request.suspect, reference)
 }
 
 fn register(
@@ -147,8 +146,8 @@ fn register(
 ) -> Result<Registered> {
     progress.start("registration", 0);
     let registrar = Registrar::new(&reference.data, &compared.ground, request.radius.least_m());
-    let file = (request.suspect.as_path(), &WHOLE);
-    crs_search::register(&registrar, reference, suspect, file, request.registration)
+    let registered = crs_search::register(&registrar, reference, suspect, request.registration);
+    registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
 }
 
 /// Demodulates what matches, and measures what a present mark would show; nothing where matches are
@@ -183,9 +182,9 @@ fn seen(
     let reference = &matched.reference.data.vertices;
     let suspect = matched.suspect.vertices.len();
     let vertices = VertexCounts { reference: reference.len(), suspect, matched: matches.count };
-    let scene = Scene { matched, matches, demodulated: demodulated.as_ref() };
-    let sketch = request.sketch.then(|| scene.sketch(&registration));
-    let evidence_map = request.evidence_map.then(|| EvidenceMap::new(&scene, crs));
+    let scene = drawing::Scene { matched, matches, demodulated: demodulated.as_ref() };
+    let sketch = request.sketch.then(|| drawing::sketch(&scene, &registration));
+    let evidence_map = request.evidence_map.then(|| drawing::evidence_map(&scene, crs));
     let observations = demodulated.as_ref().map(|demodulated| demodulated.observations);
     let (found, decoys) = match demodulated {
         Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),

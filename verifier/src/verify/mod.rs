@@ -10,35 +10,35 @@
 mod belonging;
 mod conclusion;
 mod crs_search;
+mod drawing;
 mod examination;
 mod records;
 mod references;
 mod request;
 
 pub use belonging::{check_key, check_reference};
-pub use examination::{Examination, Fit, examine, read_reference};
+pub use examination::{Examination, Suited, examine, read_reference};
 pub use records::verify_records;
-pub use references::with_reference_of_record;
 pub use request::Request;
 
 use crate::{Result, progress::Progress, report::Report};
 use conclusion::conclude;
 use meshmark_core::options::Subject;
 use meshmark_detection::decision::{Decision, Expected};
+use references::read_own_reference;
+use std::path::PathBuf;
 
-/// Verifies one suspect.
+/// Verifies one suspect against the only reference, or against that of several from which the record
+/// of the request was made.
 ///
 /// # Errors
 /// Fails on unreadable input, on parameters that do not fit the reference, and on a record of
 /// another reference.
-pub fn verify(request: &Request, progress: &mut Progress) -> Result<Report> {
-    let reference = read_reference(request, progress)?.or_fail()?;
-    if let Some(record) = &request.record {
-        check_reference(record, request, &reference, &reference.data.vertices.digest())?;
-    }
-    let seen = examine(request, &reference, progress)?.or_fail()?;
-    let (subject, decision) = decide_subjects(request, &seen);
-    let request = Request { subject, ..request.clone() };
+pub fn verify(request: &Request, references: &[PathBuf], progress: &mut Progress) -> Result<Report> {
+    let (request, reference) = read_own_reference(request, references, progress)?;
+    let seen = examine(&request, &reference, progress)?.or_fail()?;
+    let (subject, decision) = decide_subjects(&request, &seen);
+    let request = Request { subject, ..request };
     Ok(conclude(&request, &seen, decision, progress.finish()))
 }
 

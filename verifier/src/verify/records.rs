@@ -4,10 +4,9 @@
 //! registered, matched and demodulated once for all of them.
 
 use super::{
-    belonging::check_key,
+    belonging::{check_key, is_made_from},
     conclusion::conclude,
-    examination::{Examination, Fit, examine, read_reference},
-    references::is_made_from,
+    examination::{Examination, Suited, examine, read_reference},
     request::Request,
 };
 use crate::{
@@ -168,10 +167,13 @@ fn examine_group(
     let mut examined = Vec::new();
     let mut other = None;
     for path in references {
+        if group.candidates.is_empty() {
+            return Ok(examined);
+        }
         let request = Request { reference: path.clone(), ..group.request.clone() };
         let reference = match read_reference(&request, progress)? {
-            Fit::Fits(reference) => reference,
-            Fit::Unfit(error) => {
+            Suited::Yes(reference) => reference,
+            Suited::No(error) => {
                 other = Some(error.to_string());
                 continue;
             }
@@ -184,8 +186,8 @@ fn examine_group(
             continue;
         }
         match examine(&own.request, &reference, progress)? {
-            Fit::Fits(seen) => examined.push((own, seen)),
-            Fit::Unfit(error) => skip_all(&own, &error.to_string(), skip),
+            Suited::Yes(seen) => examined.push((own, seen)),
+            Suited::No(error) => skip_all(&own, &error.to_string(), skip),
         }
     }
     let reason = match (references, other) {

@@ -1,41 +1,41 @@
 //! Several references, such as the editions of a map: every record finds its own.
 
 use super::{
-    examination::{Fit, read_reference},
+    belonging::{check_reference, is_made_from},
+    examination::{Suited, read_reference},
     request::Request,
 };
 use crate::{Error, Result, progress::Progress};
-use meshmark_core::record::Record;
+use meshmark_dataset::Survey;
 use std::path::PathBuf;
 
-/// Returns the request with that of several references from which its record was made.
+/// Reads the only reference, or that of several from which the record of the request was made.
+/// Returns it with the request that names it.
 ///
 /// # Errors
 /// Fails when a reference is unreadable, when there is no record to choose by, and when the record
 /// is of none of them.
-pub fn with_reference_of_record(
+pub fn read_own_reference(
     request: &Request,
     references: &[PathBuf],
     progress: &mut Progress,
-) -> Result<Request> {
-    let Some(record) = request.record.as_ref().filter(|_| references.len() > 1) else {
-        return match references.len() {
-            1 => Ok(request.clone()),
-            _ => Err(Error::SeveralReferences),
-        };
-    };
+) -> Result<(Request, Survey)> {
+    if let [path] = references {
+        let request = Request { reference: path.clone(), ..request.clone() };
+        let reference = read_reference(&request, progress)?.or_fail()?;
+        if let Some(record) = &request.record {
+            check_reference(record, &request, &reference, &reference.data.vertices.digest())?;
+        }
+        return Ok((request, reference));
+    }
+    let Some(record) = &request.record else { return Err(Error::SeveralReferences) };
     for path in references {
         let request = Request { reference: path.clone(), ..request.clone() };
-        if let Fit::Fits(reference) = read_reference(&request, progress)?
+        if let Suited::Yes(reference) = read_reference(&request, progress)?
             && is_made_from(record, &reference.data.vertices.digest())
         {
-            return Ok(request);
+            return Ok((request, reference));
         }
     }
     Err(Error::NoReferenceOfRecord { references: references.len() })
-}
-
-/// Returns whether a record is of the reference whose vertices have this digest.
-pub fn is_made_from(record: &Record, digest: &str) -> bool {
-    record.reference.vertices_sha256 == digest
 }

@@ -1,4 +1,4 @@
-//! Rows in which something else stands for polygons and lines.
+//! Rows in which other geometries replace polygons and lines.
 
 use super::row::Row;
 use crate::attacks::Attack;
@@ -7,7 +7,7 @@ use crate::attacks::{
     outlines::Outline,
 };
 
-/// Outlines, buffers, joined areas, cut lines.
+/// Returns the rows: outlines, buffers, joined areas, cut lines.
 pub fn rows() -> Vec<Row> {
     let outlines = [
         ("centroids", "centroids of the polygons alone", Outline::Centroid),

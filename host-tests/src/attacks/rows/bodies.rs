@@ -4,7 +4,7 @@ use super::row::Row;
 use crate::attacks::Attack;
 use crate::attacks::bodies::Motion;
 
-/// Buildings shifted and turned, sheets bent, features redrawn.
+/// Returns the rows: buildings shifted and rotated, sheets bent, features redrawn.
 pub fn rows() -> Vec<Row> {
     let shifted = [0.3, 1.0, 2.0].map(|deviation| {
         let title = format!("every building shifted by N(0, {deviation} m)");

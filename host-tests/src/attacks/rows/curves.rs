@@ -10,7 +10,7 @@ use crate::attacks::{
 /// New vertices along traced lines, metres.
 const TRACED: f64 = 2.0;
 
-/// Lines and rings drawn anew: in place, and elsewhere without attributes.
+/// Returns the rows: lines and rings drawn anew, in place, and elsewhere without attributes.
 pub fn rows() -> Vec<Row> {
     let resampled = [1.0, 2.0, 5.0].map(|spacing| {
         let title = format!("resampled every {spacing} m, without the original vertices");
@@ -37,7 +37,7 @@ fn drawn(id: &str, title: &str, redrawing: Redrawing) -> Row {
     Row::new(id, title, Attack::DrawAnew(redrawing))
 }
 
-/// A row whose suspect is also moved and turned, and bare of attributes.
+/// Returns a row whose suspect is also moved and rotated, and has no attributes.
 fn moved(row: &Row) -> Row {
     let attacks = vec![
         row.attack.clone(),

@@ -1,4 +1,4 @@
-//! Rows about what formats and media do to coordinates and attributes.
+//! Rows in which formats and media change coordinates and attributes.
 
 use super::row::Row;
 use crate::attacks::Attack;
@@ -10,7 +10,7 @@ use crate::attacks::{
 };
 use std::sync::Arc;
 
-/// Other CRS and files, grids of formats, paper.
+/// Returns the rows: other CRS and files, grids of formats, paper.
 pub fn rows(foreign: &Arc<Map>) -> Vec<Row> {
     use Attack::{DropAttributes, Merge, Quantise, Reproject, RoundTrip};
     let mut rows = vec![
@@ -35,7 +35,8 @@ pub fn rows(foreign: &Arc<Map>) -> Vec<Row> {
     rows
 }
 
-/// Paper at 1 : 2000, in millimetres, a little askew; the eye that digitises it errs by 15 cm.
+/// Returns the row of a map on paper at 1 : 2000, in millimetres, slightly rotated, and digitised
+/// with errors of 15 cm.
 fn printed_and_scanned() -> Row {
     let attacks = vec![
         Attack::DropAttributes,

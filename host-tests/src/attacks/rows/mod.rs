@@ -20,9 +20,9 @@ use std::sync::Arc;
 /// The paper's unit, 10 cm, in metres: maps are in metres here.
 const UNIT: f64 = 0.1;
 
-/// The attacks of Table 2 (Ohbuchi, Ueda and Endoh 2003). Of 3a and 3b the text and the table say
-/// opposite factors; the table's are used. Figure 7 shows the crops, but the text does not say
-/// which is which.
+/// Returns the attacks of Table 2 (Ohbuchi, Ueda and Endoh 2003). For 3a and 3b the text and the
+/// table state opposite factors; those of the table are used. Figure 7 shows the crops, but the
+/// text does not number them.
 pub fn paper_rows() -> Vec<Row> {
     use Attack::{Crop, InsertVertices, Linear, Noise, Scramble, Sequence, Snap, Translate};
     let round = Snap { spacing: UNIT };
@@ -63,16 +63,16 @@ fn deformed(cell: Cell, side: Side) -> Attack {
     Attack::Deform { cell, degrees: 1.0, side }
 }
 
-/// Other maps that attacks bring into the marked one.
+/// Other maps whose features attacks bring into the marked one.
 #[derive(Debug, Clone)]
 pub struct OtherMaps {
-    /// Of another place, to be laid over.
+    /// A map of another place, to be laid over.
     pub foreign: Arc<Map>,
     /// The same map before it was marked.
     pub unmarked: Arc<Map>,
 }
 
-/// Attacks the paper does not have.
+/// Returns the attacks that the paper does not have.
 pub fn extended_rows(others: &OtherMaps) -> Vec<Row> {
     [
         geometric(),
@@ -88,7 +88,7 @@ pub fn extended_rows(others: &OtherMaps) -> Vec<Row> {
     .concat()
 }
 
-/// Noise beyond the paper's.
+/// Returns the rows with more noise than the paper's.
 fn noises() -> Vec<Row> {
     let uniform = [1.0, 1.5, 2.0].map(|half_width| {
         Row::new(
@@ -152,7 +152,8 @@ fn of_vertices() -> Vec<Row> {
     rows
 }
 
-/// Three attacks after one another, drawn from a list; the same for all maps.
+/// Returns the rows of three attacks in sequence, drawn from a list; they are the same for all
+/// maps.
 fn mixes() -> Vec<Row> {
     use Attack::{Crop, DeleteFeatures, Densify, Linear, Noise, Reproject, Scramble, Simplify, Translate};
     let mixable = [

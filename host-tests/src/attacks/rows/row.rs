@@ -5,11 +5,11 @@ use crate::attacks::{Attack, quantisation::Quantisation};
 /// One row of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// As the paper counts ("9c"), or a short name for what it does not have.
+    /// The number in the paper ("9c"), or a short name.
     pub id: String,
-    /// What is done.
+    /// A description of the attack.
     pub title: String,
-    /// How.
+    /// The attack.
     pub attack: Attack,
 }
 
@@ -18,7 +18,7 @@ impl Row {
         Row { id: id.into(), title: title.into(), attack }
     }
 
-    /// Whether features that are left have their attributes and ids, in the layers they were in.
+    /// Returns whether the remaining features keep their attributes, ids and layers.
     pub fn keeps_features(&self) -> bool {
         fn keeps(attack: &Attack) -> bool {
             match attack {

@@ -1,11 +1,11 @@
-//! Rows about which features of a map are left.
+//! Rows in which some of the features of a map remain.
 
 use super::row::Row;
 use crate::attacks::{Attack, Map};
 use std::sync::Arc;
 
-/// Features deleted, exchanged for those of the map before marking, or left in one small place
-/// only.
+/// Returns the rows: features deleted, exchanged for those of the map before marking, or kept in
+/// one small place only.
 pub fn rows(unmarked: &Arc<Map>) -> Vec<Row> {
     let share = |percent: i32| f64::from(percent) / 100.0;
     let deleted = [50, 80].map(|percent| {

@@ -1,7 +1,7 @@
 //! The segments of a map as few and short lines, where segments that share a point of the page are
 //! drawn once.
 
-use super::extent::Extent;
+use crate::report::Extent;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of segments in a drawing; more would be no clearer on a page.
@@ -13,7 +13,7 @@ type Node = [u32; 2];
 
 /// Returns lines along the segments, CRS units, snapped to the finest grid that keeps within the
 /// limit.
-pub(crate) fn lines(extent: &Extent, coords: &[[f64; 2]], segments: &[[u32; 2]]) -> Vec<Vec<[f64; 2]>> {
+pub fn lines(extent: &Extent, coords: &[[f64; 2]], segments: &[[u32; 2]]) -> Vec<Vec<[f64; 2]>> {
     let mut points = FINEST;
     loop {
         let grid = Grid::new(extent, points);

@@ -1,11 +1,10 @@
-//! Thinning: keeps one point for every cell of a grid, so that a page can show a map of a million
-//! vertices.
+//! A grid that keeps one point for every cell, so that a page can show a map of a million vertices.
 
-use super::extent::Extent;
+use crate::report::Extent;
 use std::collections::BTreeSet;
 
 /// Selects the first point of every cell.
-pub(crate) struct Thinning {
+pub struct PointGrid {
     lower: [f64; 2],
     upper: [f64; 2],
     /// Width and height of a cell, CRS units.
@@ -13,13 +12,13 @@ pub(crate) struct Thinning {
     taken: BTreeSet<[u32; 2]>,
 }
 
-impl Thinning {
+impl PointGrid {
     /// Creates a grid of `cells` cells along the longer side, which are squares on the ground.
     pub fn new(extent: &Extent, cells: usize) -> Self {
         let [width, height] = extent.size_m();
         let side_m = (width.max(height) / cells as f64).max(f64::MIN_POSITIVE);
         let cell = extent.metres_per_unit.map(|metres| side_m / metres);
-        Thinning { lower: extent.lower, upper: extent.upper, cell, taken: BTreeSet::new() }
+        PointGrid { lower: extent.lower, upper: extent.upper, cell, taken: BTreeSet::new() }
     }
 
     /// Returns whether the point is the first of its cell. Points outside the extent never are.

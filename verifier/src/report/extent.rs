@@ -1,6 +1,5 @@
 //! The extent of a map.
 
-use meshmark_core::{ground::Ground, vertices::VertexTable};
 use serde::Serialize;
 
 /// The bounding rectangle of a map.
@@ -15,11 +14,6 @@ pub struct Extent {
 }
 
 impl Extent {
-    pub(crate) fn new(vertices: &VertexTable, ground: &Ground) -> Self {
-        let (lower, upper) = vertices.bounds();
-        Extent { lower, upper, metres_per_unit: ground.metres_per_unit(vertices.centre()) }
-    }
-
     /// Returns width and height on the ground, metres.
     pub(crate) fn size_m(&self) -> [f64; 2] {
         [0, 1].map(|axis| (self.upper[axis] - self.lower[axis]) * self.metres_per_unit[axis])

@@ -89,7 +89,11 @@ impl ReportFile {
             }
             _ => ": name a file in a folder you may write to",
         };
-        Error::Unwritten { what: format!("the report {}", self.path.display()), source: error, remedy }
+        Error::Unwritten {
+            what: format!("the report {}", self.path.display()),
+            source: Box::new(error.into()),
+            remedy,
+        }
     }
 }
 

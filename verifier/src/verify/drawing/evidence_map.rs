@@ -1,0 +1,35 @@
+//! The evidence map of a scene.
+
+use super::scene::Scene;
+use crate::report::{EvidenceMap, FoundVertex, PatchEvidence};
+use meshmark_core::patches::Patch;
+use meshmark_dataset::CoordinateSystem;
+
+/// Returns the evidence map; without demodulation it has patches alone. `crs` is that of the
+/// reference.
+pub fn evidence_map(scene: &Scene, crs: Option<&CoordinateSystem>) -> EvidenceMap {
+    let reference = scene.matched.reference;
+    let (coords, ground) = (scene.coords(), &reference.ground);
+    let patches = reference.patches.as_slice();
+    let mut patch_of = vec![0; coords.len()];
+    for (number, patch) in patches.iter().enumerate() {
+        patch.vertices.iter().for_each(|&v| patch_of[v as usize] = number);
+    }
+    let of_patch = |patch: &Patch| PatchEvidence {
+        vertices: patch.vertices.iter().map(|&v| coords[v as usize]).collect(),
+        found: 0,
+        score: None,
+    };
+    let patches = patches.iter().map(of_patch).collect();
+    let mut map = EvidenceMap { crs: crs.cloned(), vertices: Vec::new(), patches };
+    let moved_m = scene.displacements_m();
+    let weights = scene.demodulated.iter().flat_map(|demodulated| &demodulated.weights);
+    for (v, &weight) in weights.enumerate() {
+        let (Some(moved_m), at) = (moved_m[v], coords[v]) else { continue };
+        let unit = ground.metres_per_unit(at);
+        let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];
+        map.vertices.push(FoundVertex { at, to, patch: patch_of[v], moved_m, weight });
+        map.patches[patch_of[v]].found += 1;
+    }
+    map
+}
