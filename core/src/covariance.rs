@@ -1,7 +1,7 @@
 //! The covariance of displacements besides the mark: a smooth deformation, shifts of patches and of
 //! polygon groups, and noise.
 
-use crate::patches::{ALONE, Patch, Patches};
+use crate::{derived::Observables, patches::ALONE};
 use faer::{
     Mat, Par, Side,
     linalg::{
@@ -62,19 +62,13 @@ impl Deformation {
     }
 }
 
-/// The place of a found vertex.
-#[derive(Debug, Clone, Copy)]
+/// The place of a point that is observed.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
     /// Metres.
     pub at_m: [f64; 2],
     /// Its polygon group.
     pub group: u32,
-}
-
-impl Place {
-    pub fn new(patches: &Patches, vertex: u32) -> Self {
-        Place { at_m: patches.positions_m()[vertex as usize], group: patches.group(vertex) }
-    }
 }
 
 /// The covariance Σ of deformation, shift and noise over o found vertices, factored.
@@ -138,9 +132,9 @@ pub(crate) fn factor(covariance: &Mat<f64>) -> Llt<f64> {
     Llt::new(covariance.as_ref(), Side::Lower).expect("a covariance with noise is positive definite")
 }
 
-/// The vertices of a patch that were found.
+/// The points of a patch that were found.
 pub(crate) struct Found {
-    /// Their positions in the patch.
+    /// Their positions among the points of the patch.
     pub rows: Vec<usize>,
     /// Their places.
     pub at: Vec<Place>,
@@ -149,13 +143,14 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    pub fn new(patches: &Patches, patch: &Patch, observed: &[Option<[f64; 2]>]) -> Self {
-        let all = patch.vertices.iter().enumerate();
+    pub fn new(of: Observables, patch: usize, observed: &[Option<[f64; 2]>]) -> Self {
+        let points = of.in_patch(patch);
+        let all = points.iter().enumerate();
         let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) = all
-            .filter(|(row, _)| !patch.hangs_elsewhere(*row))
-            .filter_map(|(row, &v)| Some((row, observed[v as usize]?)))
+            .filter(|(row, _)| of.is_determined(patch, *row))
+            .filter_map(|(row, &point)| Some((row, observed[point as usize]?)))
             .unzip();
-        let at = rows.iter().map(|&row| Place::new(patches, patch.vertices[row])).collect();
+        let at = rows.iter().map(|&row| of.place(points[row])).collect();
         Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
     }
 }

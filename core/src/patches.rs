@@ -104,7 +104,7 @@ impl Patches {
         let mesh = Mesh::delaunay(&points)?;
         let constraints = Constraints::find(map, tree, parameters.shape);
         let leaves = split(&points, &constraints, points.len() / patch_size);
-        let place = Place::of_all(&leaves, points.len());
+        let place = InPatch::of_all(leaves.iter(), points.len());
         let mut patches = with_edges(leaves, mesh.edges(), &place);
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
         constrain(&mut patches, &constraints, &place);
@@ -130,6 +130,11 @@ impl Patches {
     /// for distances.
     pub fn positions_m(&self) -> &[[f64; 2]] {
         &self.positions_m
+    }
+
+    /// Returns the place of every vertex in its patch.
+    pub(crate) fn rows(&self) -> Vec<InPatch> {
+        InPatch::of_all(self.patches.iter().map(|patch| &patch.vertices), self.vertex_count())
     }
 
     /// Returns the polygon group of a vertex, or [`ALONE`].
@@ -256,17 +261,17 @@ fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
 
 /// The patch of a vertex and its position in it.
 #[derive(Clone, Copy)]
-struct Place {
-    patch: u32,
-    row: u32,
+pub(crate) struct InPatch {
+    pub patch: u32,
+    pub row: u32,
 }
 
-impl Place {
-    fn of_all(leaves: &[Vec<u32>], vertices: usize) -> Vec<Place> {
-        let mut places = vec![Place { patch: 0, row: 0 }; vertices];
-        for (patch, leaf) in leaves.iter().enumerate() {
+impl InPatch {
+    fn of_all<'a>(leaves: impl Iterator<Item = &'a Vec<u32>>, vertices: usize) -> Vec<InPatch> {
+        let mut places = vec![InPatch { patch: 0, row: 0 }; vertices];
+        for (patch, leaf) in leaves.enumerate() {
             for (row, &v) in leaf.iter().enumerate() {
-                places[v as usize] = Place { patch: patch as u32, row: row as u32 };
+                places[v as usize] = InPatch { patch: patch as u32, row: row as u32 };
             }
         }
         places
@@ -274,7 +279,7 @@ impl Place {
 }
 
 /// Gives every leaf the mesh edges whose two ends are in it.
-fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[Place]) -> Vec<Patch> {
+fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[InPatch]) -> Vec<Patch> {
     let patch = |vertices: Vec<u32>| Patch {
         edges: Vec::with_capacity(3 * vertices.len()),
         vertices,
@@ -292,9 +297,9 @@ fn with_edges(leaves: Vec<Vec<u32>>, edges: &[[u32; 2]], places: &[Place]) -> Ve
 }
 
 /// Gives every patch the constraints on its vertices.
-fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[Place]) {
+fn constrain(patches: &mut [Patch], constraints: &Constraints, places: &[InPatch]) {
     for hanging in constraints.junctions.hanging() {
-        let Place { patch, row } = places[hanging.vertex as usize];
+        let InPatch { patch, row } = places[hanging.vertex as usize];
         let position = |&(anchor, weight): &(u32, f64)| match places[anchor as usize] {
             place if place.patch == patch => Some((place.row, weight)),
             _ => None,
@@ -316,7 +321,7 @@ const LEAST_HEIGHT: f64 = 0.01;
 /// Weighs the edges of every patch by cot α + cot β, over the angles that face them in the
 /// triangles of the mesh with all three corners in the patch. Edges of no such triangle, bridges
 /// among them, weigh 1.
-fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[Place], points: &[[f64; 2]]) {
+fn weigh(patches: &mut [Patch], triangles: &[[u32; 3]], places: &[InPatch], points: &[[f64; 2]]) {
     let mut of_patch: Vec<Vec<[u32; 3]>> = vec![Vec::new(); patches.len()];
     for triangle in triangles {
         let corners = triangle.map(|v| places[v as usize]);

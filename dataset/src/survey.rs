@@ -14,6 +14,7 @@ use gdal::{
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{
+    areas::Areas,
     ground::Ground,
     map::Map,
     map_data::{Label, MapData, Polyline},
@@ -101,7 +102,13 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let mut chains = walk.chains;
     let coords = std::mem::take(&mut chains.coords);
     let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
-    let data = MapData { labels: walk.labels, polylines: walk.polylines, ..data };
+    let areas = match selection.labels {
+        LabelFields::None => Areas::default(),
+        LabelFields::All | LabelFields::Named(_) => {
+            Areas::new(&indices, &chains.starts, chains.chain_kinds(), &chains.firsts)
+        }
+    };
+    let data = MapData { areas, labels: walk.labels, polylines: walk.polylines, ..data };
     let ground = match crs::ground(crs.as_ref(), &data.vertices) {
         Ok(ground) => Some(ground),
         Err(Error::NoCrs) => None,

@@ -6,7 +6,7 @@ use crate::{
     decision::Decoys,
     matched::Matched,
     matching::{Matches, Radius},
-    observations::{self, Observations},
+    observations::{self, Chosen, Observations},
     progress::{Listener, Progress},
     tracking::{Followed, Tracking},
 };
@@ -15,6 +15,7 @@ use meshmark_core::{
     carrier::Carrier,
     deformation::{Deformation, Prediction},
     demodulation::{self, Demodulation},
+    derived::Observables,
     key::SecretKey,
     options::Parameters,
 };
@@ -40,11 +41,11 @@ pub struct Mark<'a> {
 }
 
 impl Matched<'_> {
-    /// Returns whether no more vertices match than by chance, and, for the joint demodulator, lines
-    /// show no more corners than by chance; demodulation is impossible then.
+    /// Returns whether no more vertices match than by chance, and, for the joint demodulator, nothing
+    /// else is observed more often than by chance; demodulation is impossible then.
     pub fn is_chance(&self, demodulator: Demodulator) -> bool {
-        let is_read_by_corners = || demodulator == Demodulator::Joint && observations::corners_show(self);
-        self.is_chance_of_vertices() && !is_read_by_corners()
+        let is_read_otherwise = || demodulator == Demodulator::Joint && observations::show(self);
+        self.is_chance_of_vertices() && !is_read_otherwise()
     }
 
     /// Demodulates with a key. The paper's demodulator uses the matches unchanged; the joint one
@@ -87,11 +88,15 @@ impl Matched<'_> {
         let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
         let carriers = self.reference.carriers;
         let followed = tracking.follow(carriers, parameters, self.radius)?;
-        let (followed, observations) = observations::choose(self, followed, carriers, parameters, given)?;
+        let chosen = observations::choose(self, followed, carriers, parameters, given)?;
+        let Chosen { derived, followed, observations } = chosen;
         let Followed { radius, matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });
-        let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
+        let of = derived.as_ref().map_or(Observables::Vertices(patches), Observables::Derived);
+        let found = demodulation::joint(of, &carrier, &observed, bits, parameters, &disturbance, &step)?;
         let Prediction { deformation, weights, .. } = disturbance;
+        // Points of features have no weight of a vertex.
+        let weights = if derived.is_some() { vec![1.0; patches.vertex_count()] } else { weights };
         Ok(self.demodulated(found, (radius, matches), Some(deformation), weights, observations))
     }
 

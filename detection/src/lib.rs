@@ -53,6 +53,7 @@ mod corners;
 pub mod decision;
 mod edges;
 mod examination;
+mod features;
 mod groups;
 mod histogram;
 mod linework;
@@ -65,6 +66,7 @@ pub mod registration;
 mod tracking;
 
 pub use examination::{Demodulated, Demodulator, Mark};
+pub use features::maps_of_features;
 pub use histogram::{Histogram, round_up};
 pub use matched::{Matched, Reference};
 pub use observations::Observations;

@@ -144,7 +144,7 @@ impl Fit<'_> {
     }
 
     fn predict(&self, observed: &Observed) -> Result<Prediction> {
-        let Fit { tracking: Tracking { patches, .. }, carriers, parameters } = *self;
+        let Fit { tracking: &Tracking { patches, .. }, carriers, parameters } = *self;
         let deformation = Deformation::estimate(patches, observed, carriers, parameters)?;
         Ok(deformation.predict(patches, observed, carriers, parameters.amplitude_m))
     }
