@@ -10,6 +10,7 @@ use crate::{
     patches::{ALONE, InPatch, Patches},
     response::Response,
 };
+use std::collections::BTreeMap;
 
 /// The shares of vertices in the displacement of a point: a vertex, and for the axes a and b of the
 /// point and of the vertex the derivative `[a][b]`.
@@ -130,24 +131,20 @@ impl<'a> Observables<'a> {
 /// Returns the patch of a point, and the point in it.
 fn in_patch(patches: &Patches, rows: &[InPatch], shares: &Shares) -> (usize, Derived) {
     let energy = |matrix: &[[f64; 2]; 2]| matrix.as_flattened().iter().map(|s| s * s).sum::<f64>() / 2.0;
-    let own = |patch: u32| {
-        let is_own = move |vertex: u32| {
-            let InPatch { patch: its, row } = rows[vertex as usize];
-            its == patch && !patches.as_slice()[patch as usize].hangs_elsewhere(row as usize)
-        };
-        shares.iter().filter(move |(vertex, _)| is_own(*vertex))
-    };
-    let energy_in = |patch: u32| own(patch).map(|(_, matrix)| energy(matrix)).sum::<f64>();
-    let mut candidates: Vec<u32> = shares.iter().map(|(vertex, _)| rows[*vertex as usize].patch).collect();
-    candidates.sort_unstable();
-    candidates.dedup();
-    let best = candidates.into_iter().map(|patch| (energy_in(patch), patch));
-    let (inside, patch) =
-        best.reduce(|best, next| if next.0 > best.0 { next } else { best }).unwrap_or((0.0, 0));
+    let determined = shares.iter().filter_map(|(vertex, matrix)| {
+        let InPatch { patch, row } = rows[*vertex as usize];
+        let hangs = patches.as_slice()[patch as usize].hangs_elsewhere(row as usize);
+        (!hangs).then_some((patch, row, matrix))
+    });
+    let mut energies: BTreeMap<u32, f64> = BTreeMap::new();
+    determined.clone().for_each(|(patch, _, matrix)| *energies.entry(patch).or_default() += energy(matrix));
+    let best = energies.into_iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
+    let (patch, inside) = best.unwrap_or_default();
     let total: f64 = shares.iter().map(|(_, matrix)| energy(matrix)).sum();
+    let own = determined.filter(|(its, ..)| *its == patch);
     let point = Derived {
         place: place(patches, shares),
-        shares: own(patch).map(|(vertex, matrix)| (rows[*vertex as usize].row, *matrix)).collect(),
+        shares: own.map(|(_, row, matrix)| (row, *matrix)).collect(),
         rest2: (total - inside).max(0.0),
     };
     (patch as usize, point)
