@@ -1,7 +1,16 @@
 //! The polygons of a map, feature by feature, as references to its vertices: a few bytes for every
 //! vertex of a ring.
 
-use crate::map_data::ChainKind;
+/// The kind of a chain of coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ChainKind {
+    /// A line, or a point.
+    Line,
+    /// The outer ring of a polygon; its first vertex is repeated at the end.
+    Shell,
+    /// An inner ring of the preceding polygon; its first vertex is repeated at the end.
+    Hole,
+}
 
 /// The polygons of every feature that has one.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,7 +1,10 @@
 //! The covariance of displacements besides the mark: a smooth deformation, shifts of patches and of
 //! polygon groups, and noise.
 
-use crate::{derived::Observables, patches::ALONE};
+use crate::{
+    derived::{Observables, Place},
+    patches::ALONE,
+};
 use faer::{
     Mat, Par, Side,
     linalg::{
@@ -60,15 +63,6 @@ impl Deformation {
             SHIFT_M.powi(2) + self.of_groups(at[i].group, at[j].group) + smooth + noise
         })
     }
-}
-
-/// The place of a point that is observed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
-    /// Metres.
-    pub at_m: [f64; 2],
-    /// Its polygon group.
-    pub group: u32,
 }
 
 /// The covariance Σ of deformation, shift and noise over o found vertices, factored.

@@ -11,8 +11,8 @@ pub use crate::covariance::Deformation;
 
 use crate::{
     Result,
-    covariance::{Covariance, Found, Place, SHIFT_M, factor},
-    derived::Observables,
+    covariance::{Covariance, Found, SHIFT_M, factor},
+    derived::{Observables, Place},
     noise_law::NoiseLaw,
     options::Parameters,
     patches::{Patch, Patches},

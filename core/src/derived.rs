@@ -6,15 +6,21 @@
 //! same for both.
 
 use crate::{
-    covariance::Place,
     patches::{ALONE, InPatch, Patches},
     response::Response,
 };
 use std::collections::BTreeMap;
 
-/// The shares of vertices in the displacement of a point: a vertex, and for the axes a and b of the
-/// point and of the vertex the derivative `[a][b]`.
-pub type Shares = [(u32, [[f64; 2]; 2])];
+pub use crate::response::Shares;
+
+/// The place of a point that is observed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    /// Metres.
+    pub at_m: [f64; 2],
+    /// Its polygon group.
+    pub group: u32,
+}
 
 /// The points of a map whose displacements are observed. Every point is in one patch.
 #[derive(Clone, Copy)]
@@ -172,13 +178,15 @@ mod tests {
         deformation::Deformation,
         demodulation,
         embedding::embed,
+        ground::Ground,
         key::SecretKey,
+        map::Map,
         map_data::{ChainKind, MapData},
         message::Message,
         modulation::displacements_m,
         options::{Parameters, Rigidity},
+        spectrum::Basis,
     };
-    use crate::{ground::Ground, map::Map};
 
     const EQUAL: [[f64; 2]; 2] = [[0.25, 0.0], [0.0, 0.25]];
 
@@ -213,7 +221,7 @@ mod tests {
             let vertices = &patches.as_slice()[0].vertices[4..7];
             let shares: Vec<(u32, [[f64; 2]; 2])> = vertices.iter().map(|vertex| (*vertex, skew)).collect();
             let points = DerivedPoints::new(&patches, [&shares[..]].into_iter());
-            let basis = crate::spectrum::Basis::low_frequencies(&patches.as_slice()[0], 60).unwrap();
+            let basis = Basis::low_frequencies(&patches.as_slice()[0], 60).unwrap();
             let response = Response::carriers(&patches.as_slice()[0], &basis, shape);
             let coefficients =
                 [0, 1].map(|axis| (0..59).map(|i| ((i * 7 + axis) % 5) as f64 - 2.0).collect());

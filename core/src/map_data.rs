@@ -1,5 +1,7 @@
 //! The data of a map as numbers, which reading creates and which marking and detection use.
 
+pub use crate::areas::ChainKind;
+
 use crate::{
     Error, Result, areas::Areas, disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice,
     vertices::VertexTable,
@@ -22,17 +24,6 @@ pub struct MapData {
     pub labels: Vec<Label>,
     /// Rings and lines with enough vertices to be distinctive.
     pub polylines: Vec<Polyline>,
-}
-
-/// The kind of a chain of coordinates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ChainKind {
-    /// A line, or a point.
-    Line,
-    /// The outer ring of a polygon; its first vertex is repeated at the end.
-    Shell,
-    /// An inner ring of the preceding polygon; its first vertex is repeated at the end.
-    Hole,
 }
 
 /// An attribute value of a feature with its place: a landmark, where another map has an equal

@@ -1,10 +1,14 @@
 //! The response of the vertices of a patch to its coefficients, constraints included.
 
-use crate::{derived::Shares, options::Rigidity, patches::Patch, spectrum::Basis};
+use crate::{options::Rigidity, patches::Patch, spectrum::Basis};
 use faer::{
     Accum, Mat, Par, Scale,
     linalg::matmul::triangular::{self, BlockStructure},
 };
+
+/// The shares of vertices in the displacement of a point: a vertex, and for the axes a and b of the
+/// point and of the vertex the derivative `[a][b]`.
+pub type Shares = [(u32, [[f64; 2]; 2])];
 
 /// The displacements by unit coefficients, n × k per axis.
 pub(crate) enum Response {

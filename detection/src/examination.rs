@@ -6,7 +6,8 @@ use crate::{
     decision::Decoys,
     matched::Matched,
     matching::{Matches, Radius},
-    observations::{self, Chosen, Observations},
+    observations::{self, Chosen},
+    observed_on::Observations,
     progress::{Listener, Progress},
     tracking::{Followed, Tracking},
 };

@@ -6,6 +6,7 @@ use crate::{
     features::{self, Features},
     matched::Matched,
     matching::{LEAST_MATCHED, Matches, OUT_OF_PLACE, Radius, is_chance},
+    observed_on::Observations,
     tracking::Followed,
 };
 use meshmark_core::{
@@ -15,21 +16,6 @@ use meshmark_core::{
     options::Parameters,
 };
 use rstar::{AABB, Envelope};
-use serde::Serialize;
-
-/// What the displacements of the reference vertices were observed on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Observations {
-    /// On matched vertices of the suspect.
-    Vertices,
-    /// On the corners between edges of the reference on which lines of the suspect lie.
-    Corners,
-    /// On the centroids of polygons.
-    Centroids,
-    /// On opposite corners of the bounding boxes of polygons.
-    Boxes,
-}
 
 /// The displacements to demodulate.
 pub struct Chosen<'a> {

@@ -13,7 +13,7 @@ use crate::{
     features,
     linework::{Edge, Plane, is_alone},
     matched::{Matched, Reference},
-    observations::Observations,
+    observed_on::Observations,
     progress::Listener,
 };
 use meshmark_core::{

@@ -1,6 +1,9 @@
 //! Bounding boxes of polygons, as linear functions of their vertices.
 
-use super::{FeaturePoint, extremes, places};
+use super::{
+    extremes,
+    points::{FeaturePoint, places},
+};
 use crate::linework::Plane;
 use meshmark_core::map_data::MapData;
 

@@ -1,6 +1,6 @@
 //! Centroids of polygons by area, as linear functions of their vertices.
 
-use super::{FeaturePoint, places};
+use super::points::{FeaturePoint, places};
 use crate::linework::Plane;
 use meshmark_core::{areas::Ring, map_data::MapData};
 

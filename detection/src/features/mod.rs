@@ -5,15 +5,17 @@
 mod boxes;
 mod centroids;
 mod extremes;
+mod points;
 
 use crate::{
     linework::{Plane, is_alone},
     matched::Matched,
     matching::{LEAST_MATCHED, Matcher, Radius, RadiusChoice, RadiusReason, by_chance, is_chance},
-    observations::Observations,
+    observed_on::Observations,
 };
 use boxes::Frame;
 use meshmark_core::{Result, derived::Shares, ground::Ground, map_data::MapData, vertices::VertexTable};
+use points::FeaturePoint;
 use rayon::prelude::*;
 use rstar::{RTree, primitives::GeomWithData};
 
@@ -21,16 +23,6 @@ use rstar::{RTree, primitives::GeomWithData};
 const KINDS: [Observations; 2] = [Observations::Centroids, Observations::Boxes];
 /// A suspect that consists of points of features has more than this share of its vertices in them.
 const MOSTLY: f64 = 0.8;
-
-/// A point of a feature of the reference.
-struct FeaturePoint {
-    /// Its place in the plane, metres.
-    at_m: [f64; 2],
-    /// The shares of the vertices in its displacement.
-    shares: Vec<(u32, [[f64; 2]; 2])>,
-    /// The variance of its displacement that is no linear function, per axis.
-    variance_m2: f64,
-}
 
 /// The points of features that a suspect shows.
 pub struct Features {
@@ -179,11 +171,6 @@ impl<'a> Pair<'a> {
     fn plane(&self) -> Plane {
         Plane::new(self.ground, self.reference.vertices.centre())
     }
-}
-
-/// Returns the places of the vertices of a ring in the plane, metres.
-fn places(reference: &MapData, plane: &Plane, vertices: &[u32]) -> Vec<[f64; 2]> {
-    vertices.iter().map(|&vertex| plane.at(reference.vertices.coords()[vertex as usize])).collect()
 }
 
 #[cfg(test)]
