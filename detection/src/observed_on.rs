@@ -15,3 +15,10 @@ pub enum Observations {
     /// On opposite corners of the bounding boxes of polygons.
     Boxes,
 }
+
+impl Observations {
+    /// Returns whether points of features are observed in place of vertices.
+    pub fn is_of_features(self) -> bool {
+        matches!(self, Observations::Centroids | Observations::Boxes)
+    }
+}

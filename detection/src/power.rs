@@ -87,15 +87,11 @@ fn trial_key(matched: &Matched) -> SecretKey {
 
 /// Returns where the vertices of the suspect go when the vertices of the reference move, CRS units.
 fn moved(matched: &Matched, observed_on: Observations, displacement_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    match observed_on {
-        Observations::Vertices | Observations::Corners => {
-            let linework = Linework::new(matched.reference.data, &matched.reference.ground);
-            matched.moved.par_iter().map(|&place| linework.moved(place, displacement_m)).collect()
-        }
-        Observations::Centroids | Observations::Boxes => {
-            features::moved(matched, observed_on, displacement_m)
-        }
+    if observed_on.is_of_features() {
+        return features::moved(matched, observed_on, displacement_m);
     }
+    let linework = Linework::new(matched.reference.data, &matched.reference.ground);
+    matched.moved.par_iter().map(|&place| linework.moved(place, displacement_m)).collect()
 }
 
 /// The segments of a reference, and its vertices without a segment, in the plane.
