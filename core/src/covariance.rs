@@ -1,7 +1,10 @@
 //! The covariance of displacements besides the mark: a smooth deformation, shifts of patches and of
 //! polygon groups, and noise.
 
-use crate::patches::{ALONE, Patch, Patches};
+use crate::{
+    derived::{Observables, Site},
+    patches::ALONE,
+};
 use faer::{
     Mat, Par, Side,
     linalg::{
@@ -59,21 +62,6 @@ impl Deformation {
             let smooth = if self.deviation_m > 0.0 { self.covariance(at[i].at_m, at[j].at_m) } else { 0.0 };
             SHIFT_M.powi(2) + self.of_groups(at[i].group, at[j].group) + smooth + noise
         })
-    }
-}
-
-/// The place of a found vertex.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Site {
-    /// Metres.
-    pub at_m: [f64; 2],
-    /// Its polygon group.
-    pub group: u32,
-}
-
-impl Site {
-    pub fn new(patches: &Patches, vertex: u32) -> Self {
-        Site { at_m: patches.positions_m()[vertex as usize], group: patches.group(vertex) }
     }
 }
 
@@ -138,9 +126,9 @@ pub(crate) fn factor(covariance: &Mat<f64>) -> Llt<f64> {
     Llt::new(covariance.as_ref(), Side::Lower).expect("a covariance with noise is positive definite")
 }
 
-/// The vertices of a patch that were found.
+/// The points of a patch that were found.
 pub(crate) struct Found {
-    /// Their positions in the patch.
+    /// Their positions among the points of the patch.
     pub rows: Vec<usize>,
     /// Their places.
     pub at: Vec<Site>,
@@ -149,13 +137,14 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    pub fn new(patches: &Patches, patch: &Patch, observed: &[Option<[f64; 2]>]) -> Self {
-        let all = patch.vertices.iter().enumerate();
+    pub fn new(of: Observables, patch: usize, observed: &[Option<[f64; 2]>]) -> Self {
+        let points = of.in_patch(patch);
+        let all = points.iter().enumerate();
         let (rows, displacement): (Vec<usize>, Vec<[f64; 2]>) = all
-            .filter(|(row, _)| !patch.hangs_elsewhere(*row))
-            .filter_map(|(row, &v)| Some((row, observed[v as usize]?)))
+            .filter(|(row, _)| of.is_determined(patch, *row))
+            .filter_map(|(row, &point)| Some((row, observed[point as usize]?)))
             .unzip();
-        let at = rows.iter().map(|&row| Site::new(patches, patch.vertices[row])).collect();
+        let at = rows.iter().map(|&row| of.place(points[row])).collect();
         Found { moved: Mat::from_fn(rows.len(), 2, |o, axis| displacement[o][axis]), rows, at }
     }
 }

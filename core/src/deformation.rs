@@ -11,7 +11,8 @@ pub use crate::covariance::Deformation;
 
 use crate::{
     Result,
-    covariance::{Covariance, Found, SHIFT_M, Site, factor},
+    covariance::{Covariance, Found, SHIFT_M, factor},
+    derived::{Observables, Site},
     noise_law::NoiseLaw,
     options::Parameters,
     patches::{Patch, Patches},
@@ -21,8 +22,8 @@ use crate::{
 use faer::{Mat, linalg::solvers::Solve};
 use rayon::prelude::*;
 
-/// Displacement of every reference vertex in canonical order, metres, or `None` where it was not
-/// found.
+/// Displacement of every observable point in order, metres, or `None` where it was not found: of the
+/// reference vertices in canonical order, or of points derived from them.
 pub type Observed = [Option<[f64; 2]>];
 
 /// Lower bound of the estimated noise, metres.
@@ -30,7 +31,7 @@ pub(crate) const LEAST_NOISE_M: f64 = 0.01;
 /// Numbers of patches, and of vertices in each, from which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
 const SAMPLE_VERTICES: usize = 200;
-/// Fewer found vertices carry no information about a patch.
+/// Fewer found points carry no information about a patch.
 const LEAST_FOUND: usize = 30;
 /// A residual of more standard deviations than this weighs less (Huber 1964).
 const HUBER: f64 = 2.0;
@@ -52,10 +53,9 @@ const NOISES_M: [f64; 11] = [0.01, 0.03, 0.06, 0.1, 0.16, 0.25, 0.35, 0.5, 0.8, 
 pub struct Prediction {
     /// Its hyper-parameters.
     pub deformation: Deformation,
-    /// The deformation at every reference vertex in canonical order, found or not, metres.
+    /// The deformation at every observable point in order, found or not, metres.
     pub displacement_m: Vec<[f64; 2]>,
-    /// The weight of every reference vertex: 1, or less where its displacement disagrees with the
-    /// others.
+    /// The weight of every such point: 1, or less where its displacement disagrees with the others.
     pub weights: Vec<f64>,
 }
 
@@ -119,17 +119,19 @@ impl Deformation {
     ///
     /// # Errors
     /// [`crate::Error::NoConvergence`].
-    pub fn estimate(
-        patches: &Patches,
+    pub fn estimate<'a>(
+        of: impl Into<Observables<'a>>,
         observed: &Observed,
         carriers: usize,
         parameters: &Parameters,
     ) -> Result<Self> {
-        let found = |p: &&Patch| p.vertices.iter().filter(|&&v| observed[v as usize].is_some()).count();
-        let known: Vec<&Patch> = patches.as_slice().iter().filter(|p| found(p) >= LEAST_FOUND).collect();
+        let of = of.into();
+        let found = |p: &usize| of.in_patch(*p).iter().filter(|&&v| observed[v as usize].is_some()).count();
+        let patches = 0..of.patches().as_slice().len();
+        let known: Vec<usize> = patches.filter(|patch| found(patch) >= LEAST_FOUND).collect();
         let step = known.len().div_ceil(SAMPLE_PATCHES).max(1);
-        let chosen: Vec<&Patch> = known.into_iter().step_by(step).collect();
-        let sample = |patch: &&Patch| Sample::new(patches, patch, observed, carriers, parameters);
+        let chosen: Vec<usize> = known.into_iter().step_by(step).collect();
+        let sample = |patch: &usize| Sample::new(of, *patch, observed, carriers, parameters);
         let samples: Vec<Sample> = chosen.par_iter().map(sample).collect::<Result<_>>()?;
         Ok(most_likely(|candidate| {
             let each: Vec<f64> = samples.par_iter().map(|s| s.log_likelihood(candidate)).collect();
@@ -139,30 +141,33 @@ impl Deformation {
 
     /// Predicts the deformation from the observed displacements. The mark counts as noise here, so
     /// no spectrum is needed.
-    pub fn predict(
+    pub fn predict<'a>(
         &self,
-        patches: &Patches,
+        of: impl Into<Observables<'a>>,
         observed: &Observed,
         carriers: usize,
         amplitude_m: f64,
     ) -> Prediction {
-        let predict = |patch: &Patch| {
+        let of = of.into();
+        let predict = |(number, patch): (usize, &Patch)| {
             let mark2 = amplitude_m.powi(2) * carriers as f64 / patch.vertices.len() as f64;
             let with_mark = Deformation { noise_m: (self.noise_m.powi(2) + mark2).sqrt(), ..*self };
-            Kriging::new(with_mark, Found::new(patches, patch, observed)).predict(patches, patch)
+            Kriging::new(with_mark, Found::new(of, number, observed)).predict(of, of.in_patch(number))
         };
-        let predicted: Vec<PatchPrediction> = patches.as_slice().par_iter().map(predict).collect();
+        let patches = of.patches().as_slice().par_iter().enumerate();
+        let predicted: Vec<PatchPrediction> = patches.map(predict).collect();
         let mut all = Prediction {
             deformation: *self,
             displacement_m: vec![[0.0; 2]; observed.len()],
             weights: vec![1.0; observed.len()],
         };
-        for (patch, part) in patches.as_slice().iter().zip(predicted) {
-            for (&v, displacement) in patch.vertices.iter().zip(part.displacement_m) {
-                all.displacement_m[v as usize] = displacement;
+        for (patch, part) in predicted.into_iter().enumerate() {
+            let points = of.in_patch(patch);
+            for (&point, displacement) in points.iter().zip(part.displacement_m) {
+                all.displacement_m[point as usize] = displacement;
             }
             for (row, weight) in part.rows.into_iter().zip(part.weights) {
-                all.weights[patch.vertices[row] as usize] = weight;
+                all.weights[points[row] as usize] = weight;
             }
         }
         all
@@ -207,18 +212,18 @@ impl Kriging {
         Kriging { deformation, found, weights, solved, residuals_m }
     }
 
-    fn predict(self, patches: &Patches, patch: &Patch) -> PatchPrediction {
+    fn predict(self, of: Observables, points: &[u32]) -> PatchPrediction {
         let total = |axis: usize| (0..self.found.rows.len()).map(|o| self.solved[(o, axis)]).sum::<f64>();
         let shift = [0, 1].map(|axis| SHIFT_M.powi(2) * total(axis));
-        let anywhere = |v: u32| {
-            let here = Site::new(patches, v);
+        let anywhere = |point: u32| {
+            let here = of.place(point);
             self.found.at.iter().enumerate().fold(shift, |sum, (o, there)| {
                 let k = self.deformation.covariance(here.at_m, there.at_m)
                     + self.deformation.of_groups(here.group, there.group);
                 [sum[0] + k * self.solved[(o, 0)], sum[1] + k * self.solved[(o, 1)]]
             })
         };
-        let mut displacement_m = vec![None; patch.vertices.len()];
+        let mut displacement_m = vec![None; points.len()];
         if self.deformation.is_still() {
             displacement_m.fill(Some(shift));
         }
@@ -226,8 +231,8 @@ impl Kriging {
             let fitted = [0, 1].map(|axis| self.found.moved[(o, axis)] - self.residuals_m[o][axis]);
             displacement_m[row].get_or_insert(fitted);
         }
-        let each = displacement_m.into_iter().zip(&patch.vertices);
-        let displacement_m = each.map(|(known, &v)| known.unwrap_or_else(|| anywhere(v))).collect();
+        let each = displacement_m.into_iter().zip(points);
+        let displacement_m = each.map(|(known, &point)| known.unwrap_or_else(|| anywhere(point))).collect();
         PatchPrediction { displacement_m, rows: self.found.rows, weights: self.weights }
     }
 }
@@ -243,19 +248,20 @@ struct Sample {
 
 impl Sample {
     fn new(
-        patches: &Patches,
-        patch: &Patch,
+        of: Observables,
+        number: usize,
         observed: &Observed,
         carriers: usize,
         parameters: &Parameters,
     ) -> Result<Self> {
-        let mut found = Found::new(patches, patch, observed);
+        let patch = &of.patches().as_slice()[number];
+        let mut found = Found::new(of, number, observed);
         // Neighbours in x remain, as short distances determine ℓ.
         found.rows.truncate(SAMPLE_VERTICES);
         found.at.truncate(SAMPLE_VERTICES);
         let basis = Basis::low_frequencies(patch, carriers + 1)?;
         let count = found.rows.len();
-        let seen = Response::carriers(patch, &basis, parameters.shape).rows(&found.rows);
+        let seen = of.seen(number, &Response::carriers(patch, &basis, parameters.shape), &found.rows);
         let moved = found.moved.subrows(0, count).to_owned();
         let mark = seen.covariance() * faer::Scale(parameters.amplitude_m.powi(2));
         Ok(Sample { at: found.at, moved, mark })
@@ -364,7 +370,7 @@ mod tests {
     #[test]
     fn without_a_deformation_the_covariance_needs_no_factoring_and_at_a_found_vertex_no_kernel() {
         let patches = patches();
-        let found = Found::new(&patches, &patches.as_slice()[0], &observed(&patches));
+        let found = Found::new((&patches).into(), 0, &observed(&patches));
         let weights: Vec<f64> = (0..found.rows.len()).map(|o| 0.1 + (o % 10) as f64 / 10.0).collect();
         let still = Deformation::none(0.03);
         let (quick, dense) = (

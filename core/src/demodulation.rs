@@ -12,6 +12,7 @@ use crate::{
     code::{Code, Decoded},
     covariance::{Covariance, Found, factor},
     deformation::{Observed, Prediction},
+    derived::Observables,
     message::Message,
     options::Parameters,
     patches::{Patch, Patches},
@@ -182,7 +183,7 @@ pub fn paper(
     parameters: &Parameters,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Demodulation> {
-    let job = Job::new(patches, carrier, observed, bits, parameters, progress)?;
+    let job = Job::new(patches.into(), carrier, observed, bits, parameters, progress)?;
     let sums = job.sum_over_patches(|_, basis, found, chips| {
         let carriers = job.carriers;
         let filled = |axis: usize| {
@@ -229,14 +230,14 @@ fn paper_estimate(job: &Job, sums: Sums) -> Demodulation {
     }
 }
 
-/// Demodulates all bits at once over the found vertices: y_o = S_o b + f_o + ε with signatures
-/// S = α E diag(p) C, and with the smooth deformation f and noise ε of `disturbance`. Vertices that
-/// were not found are erasures. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over
+/// Demodulates all bits at once over the found points: y_o = S_o b + f_o + ε with signatures
+/// S = α E diag(p) C, and with the smooth deformation f and noise ε of `disturbance`. Points that
+/// were not found are erasures, and those derived from vertices have signatures derived alike. With Σ = cov(f + ε), G = Σ SᵀΣ⁻¹S and h = Σ SᵀΣ⁻¹y summed over
 /// patches and axes: b̂ = (G + I)⁻¹ h, v = diag (G + I)⁻¹.
 ///
 /// The other arguments and the errors are those of [`paper`].
-pub fn joint(
-    patches: &Patches,
+pub fn joint<'a>(
+    of: impl Into<Observables<'a>>,
     carrier: &Carrier,
     observed: &Observed,
     bits: usize,
@@ -244,7 +245,7 @@ pub fn joint(
     disturbance: &Prediction,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Demodulation> {
-    let job = Job::new(patches, carrier, observed, bits, parameters, progress)?;
+    let job = Job::new(of.into(), carrier, observed, bits, parameters, progress)?;
     joint_of(&job, disturbance)
 }
 
@@ -257,7 +258,7 @@ pub(crate) fn joint_solved(
     parameters: &Parameters,
     disturbance: &Prediction,
 ) -> Result<Demodulation> {
-    let job = Job::new(patches, carrier, observed, bits, parameters, &|_| ())?;
+    let job = Job::new(patches.into(), carrier, observed, bits, parameters, &|_| ())?;
     joint_of(&Job { solved, ..job }, disturbance)
 }
 
@@ -267,10 +268,12 @@ fn joint_of(job: &Job, disturbance: &Prediction) -> Result<Demodulation> {
         if found.rows.is_empty() {
             return Sums::nothing(job);
         }
+        let points = job.of.in_patch(patch);
         let weights: Vec<f64> =
-            found.rows.iter().map(|&row| disturbance.weights[patch.vertices[row] as usize]).collect();
+            found.rows.iter().map(|&row| disturbance.weights[points[row] as usize]).collect();
         let covariance = Covariance::new(&disturbance.deformation, &found.at, &weights);
-        let seen = Response::carriers(patch, basis, parameters.shape).rows(&found.rows);
+        let response = Response::carriers(&job.patches()[patch], basis, parameters.shape);
+        let seen = job.of.seen(patch, &response, &found.rows);
         let seen = seen.map(|block| covariance.whiten(block));
         let kernel = seen.kernel();
         let correlations = seen.correlations(&covariance.whiten(found.moved.clone()));
@@ -302,7 +305,7 @@ fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
 }
 
 struct Job<'a> {
-    patches: &'a Patches,
+    of: Observables<'a>,
     /// The bases of the first patches, as far as they are known.
     solved: &'a [Basis],
     carrier: &'a Carrier,
@@ -360,17 +363,21 @@ impl Sums {
 
 impl<'a> Job<'a> {
     fn new(
-        patches: &'a Patches,
+        of: Observables<'a>,
         carrier: &'a Carrier,
         observed: &'a Observed,
         message_bits: usize,
         parameters: &'a Parameters,
         progress: &'a (dyn Fn(usize) + Sync),
     ) -> Result<Self> {
-        assert_eq!(observed.len(), patches.vertex_count(), "one observation for every reference vertex");
-        let carriers = patches.carriers(message_bits, parameters)?;
+        assert_eq!(observed.len(), of.count(), "one observation for every observable point");
+        let carriers = of.patches().carriers(message_bits, parameters)?;
         let bits = carriers / parameters.chip_rate;
-        Ok(Job { patches, solved: &[], carrier, observed, bits, carriers, parameters, progress })
+        Ok(Job { of, solved: &[], carrier, observed, bits, carriers, parameters, progress })
+    }
+
+    fn patches(&self) -> &'a [Patch] {
+        self.of.patches().as_slice()
     }
 
     /// Returns the bit of the i-th chip, counted from 0.
@@ -404,14 +411,14 @@ impl<'a> Job<'a> {
         gram
     }
 
-    /// Sums `f(patch, basis, found vertices, chips)` over the patches. The size of the blocks in
+    /// Sums `f(patch, basis, found points, chips)` over the patches. The size of the blocks in
     /// which they are added depends on the number of patches alone, so the sum is the same for any
     /// number of threads, and no matrix is held for every patch.
     fn sum_over_patches(
         &self,
-        f: impl Fn(&Patch, &Basis, &Found, &[Vec<f64>; 2]) -> Sums + Sync,
+        f: impl Fn(usize, &Basis, &Found, &[Vec<f64>; 2]) -> Sums + Sync,
     ) -> Result<Sums> {
-        let all = self.patches.as_slice();
+        let all = self.patches();
         let block = all.len().div_ceil(64);
         let sum_block = |(index, patches): (usize, &[Patch])| -> Result<Sums> {
             let mut total: Option<Sums> = None;
@@ -419,8 +426,8 @@ impl<'a> Job<'a> {
                 let number = index * block + offset;
                 let basis = Basis::known_or_solved(self.solved, number, patch, self.carriers + 1)?;
                 let chips = [0, 1].map(|axis| self.carrier.chips(number, axis, self.carriers));
-                let found = Found::new(self.patches, patch, self.observed);
-                let sums = f(patch, &basis, &found, &chips);
+                let found = Found::new(self.of, number, self.observed);
+                let sums = f(number, &basis, &found, &chips);
                 match &mut total {
                     None => total = Some(sums),
                     Some(total) => total.add(sums),

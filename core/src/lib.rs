@@ -36,6 +36,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod areas;
 pub mod bodies;
 pub mod carrier;
 pub mod code;
@@ -43,6 +44,7 @@ pub mod constraints;
 mod covariance;
 pub mod deformation;
 pub mod demodulation;
+pub mod derived;
 pub mod disjoint_sets;
 pub mod distortion;
 pub mod embedding;

@@ -1,7 +1,9 @@
 //! The data of a map as numbers, which reading creates and which marking and detection use.
 
+pub use crate::areas::ChainKind;
+
 use crate::{
-    Error, Result, disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice,
+    Error, Result, areas::Areas, disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice,
     vertices::VertexTable,
 };
 
@@ -16,21 +18,12 @@ pub struct MapData {
     /// For every vertex the first vertex of its polygon group, which shared vertices join; the
     /// vertex itself when it is in no group.
     pub polygon_roots: Vec<u32>,
+    /// The polygons by feature, for a reference.
+    pub areas: Areas,
     /// Attribute texts with their places.
     pub labels: Vec<Label>,
     /// Rings and lines with enough vertices to be distinctive.
     pub polylines: Vec<Polyline>,
-}
-
-/// The kind of a chain of coordinates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ChainKind {
-    /// A line, or a point.
-    Line,
-    /// The outer ring of a polygon; its first vertex is repeated at the end.
-    Shell,
-    /// An inner ring of the preceding polygon; its first vertex is repeated at the end.
-    Hole,
 }
 
 /// An attribute value of a feature with its place: a landmark, where another map has an equal
@@ -71,7 +64,7 @@ impl Polyline {
 }
 
 impl MapData {
-    /// Creates a map without labels and polylines from coordinates, CRS units, chain after chain.
+    /// Creates a map without areas, labels and polylines from coordinates, CRS units, chain after chain.
     /// `starts` holds the ascending index in `coords` of the start of each chain, and the kinds
     /// describe the chains. Also returns the canonical index of the vertex of every coordinate.
     ///
@@ -85,14 +78,20 @@ impl MapData {
         let (vertices, indices) = VertexTable::indexed(coords)?;
         let segments = segments(&indices, starts);
         let polygon_roots = polygon_roots(&indices, starts, kinds, vertices.len());
-        let (labels, polylines) = (Vec::new(), Vec::new());
-        Ok((MapData { vertices, segments, polygon_roots, labels, polylines }, indices))
+        Ok((MapData { segments, polygon_roots, ..Self::of_points(vertices) }, indices))
     }
 
     /// Creates a map of points alone.
     pub fn of_points(vertices: VertexTable) -> Self {
         let polygon_roots = (0..vertices.len() as u32).collect();
-        MapData { vertices, segments: Vec::new(), polygon_roots, labels: Vec::new(), polylines: Vec::new() }
+        MapData {
+            vertices,
+            segments: Vec::new(),
+            polygon_roots,
+            areas: Areas::default(),
+            labels: Vec::new(),
+            polylines: Vec::new(),
+        }
     }
 
     /// Returns the same map with all coordinates transformed by `place`, for example into another
@@ -118,7 +117,8 @@ impl MapData {
         let of_polylines = polylines.iter().flat_map(|polyline| polyline.vertices.iter().copied()).collect();
         let in_polylines = polylines.iter_mut().flat_map(|polyline| &mut polyline.vertices);
         in_polylines.zip(place(of_polylines)?).for_each(|(vertex, point)| *vertex = point);
-        Ok(MapData { vertices, segments, polygon_roots: joined.roots(), labels, polylines })
+        let areas = self.areas.clone().on(&indices);
+        Ok(MapData { vertices, segments, polygon_roots: joined.roots(), areas, labels, polylines })
     }
 
     /// Returns the map as input of the algorithm.

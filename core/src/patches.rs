@@ -104,7 +104,7 @@ impl Patches {
         let mesh = Mesh::delaunay(&points)?;
         let constraints = Constraints::find(map, tree, parameters.shape);
         let leaves = split(&points, &constraints, points.len() / patch_size);
-        let place = PatchRow::of_all(&leaves, points.len());
+        let place = PatchRow::of_all(leaves.iter(), points.len());
         let mut patches = with_edges(leaves, mesh.edges(), &place);
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
         constrain(&mut patches, &constraints, &place);
@@ -130,6 +130,11 @@ impl Patches {
     /// for distances.
     pub fn positions_m(&self) -> &[[f64; 2]] {
         &self.positions_m
+    }
+
+    /// Returns the place of every vertex in its patch.
+    pub(crate) fn rows(&self) -> Vec<PatchRow> {
+        PatchRow::of_all(self.patches.iter().map(|patch| &patch.vertices), self.vertex_count())
     }
 
     /// Returns the polygon group of a vertex, or [`ALONE`].
@@ -256,15 +261,15 @@ fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
 
 /// The patch of a vertex and its position in it.
 #[derive(Clone, Copy)]
-struct PatchRow {
-    patch: u32,
-    row: u32,
+pub(crate) struct PatchRow {
+    pub patch: u32,
+    pub row: u32,
 }
 
 impl PatchRow {
-    fn of_all(leaves: &[Vec<u32>], vertices: usize) -> Vec<PatchRow> {
+    fn of_all<'a>(leaves: impl Iterator<Item = &'a Vec<u32>>, vertices: usize) -> Vec<PatchRow> {
         let mut places = vec![PatchRow { patch: 0, row: 0 }; vertices];
-        for (patch, leaf) in leaves.iter().enumerate() {
+        for (patch, leaf) in leaves.enumerate() {
             for (row, &v) in leaf.iter().enumerate() {
                 places[v as usize] = PatchRow { patch: patch as u32, row: row as u32 };
             }

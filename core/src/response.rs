@@ -6,6 +6,10 @@ use faer::{
     linalg::matmul::triangular::{self, BlockStructure},
 };
 
+/// The shares of vertices in the displacement of a point: a vertex, and for the axes a and b of the
+/// point and of the vertex the derivative `[a][b]`.
+pub type Shares = [(u32, [[f64; 2]; 2])];
+
 /// The displacements by unit coefficients, n × k per axis.
 pub(crate) enum Response {
     /// Both axes respond alike, each to its own coefficients.
@@ -137,6 +141,41 @@ impl Response {
             Response::Coupled(blocks) => {
                 Response::Coupled(blocks.each_ref().map(|row| row.each_ref().map(of)))
             }
+        }
+    }
+
+    /// Returns the rows of points that are derived from vertices.
+    pub fn derived(&self, points: &[&Shares]) -> Self {
+        let zeros = || [0, 1].map(|_| [0, 1].map(|_| Mat::zeros(points.len(), self.columns())));
+        let mut blocks: [[Mat<f64>; 2]; 2] = zeros();
+        for (point, (row, shares)) in
+            points.iter().enumerate().flat_map(|(point, shares)| shares.iter().map(move |s| (point, *s)))
+        {
+            for (axis, of_axes) in shares.iter().enumerate() {
+                for (of_axis, share) in of_axes.iter().enumerate().filter(|(_, share)| **share != 0.0) {
+                    for (coefficients, block) in self.row_of(of_axis) {
+                        let derived = &mut blocks[axis][coefficients];
+                        (0..block.ncols())
+                            .for_each(|i| derived[(point, i)] += share * block[(row as usize, i)]);
+                    }
+                }
+            }
+        }
+        Response::Coupled(blocks)
+    }
+
+    fn columns(&self) -> usize {
+        match self {
+            Response::Separate(block) => block.ncols(),
+            Response::Coupled([[block, _], _]) => block.ncols(),
+        }
+    }
+
+    /// Returns the blocks by which an axis responds, each with the axis of its coefficients.
+    fn row_of(&self, axis: usize) -> Vec<(usize, &Mat<f64>)> {
+        match self {
+            Response::Separate(block) => vec![(axis, block)],
+            Response::Coupled(blocks) => blocks[axis].iter().enumerate().collect(),
         }
     }
 }

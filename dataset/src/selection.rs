@@ -7,10 +7,11 @@ use meshmark_core::options::join_list;
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
 
-/// Which attributes become labels. With labels come polylines: both are for registration.
+/// Which attributes become labels. With labels come polylines, both for registration, and areas for
+/// detection.
 #[derive(Debug, Clone, Copy)]
 pub enum LabelFields<'a> {
-    /// None, and no polylines: only the vertices are wanted.
+    /// None, no polylines and no areas: only the vertices are wanted.
     None,
     /// Every string and integer field.
     All,

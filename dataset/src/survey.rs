@@ -14,6 +14,7 @@ use gdal::{
     vector::{Feature, Layer, LayerAccess},
 };
 use meshmark_core::{
+    areas::Areas,
     ground::Ground,
     map::Map,
     map_data::{Label, MapData, Polyline},
@@ -22,7 +23,7 @@ use meshmark_core::{
 use std::{collections::BTreeMap, ops::Range};
 
 /// A map as marking and verification read it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Survey {
     /// The data of the map.
     pub data: MapData,
@@ -101,6 +102,7 @@ pub fn numbers(dataset: &Dataset, selection: &Selection) -> Result<Numbers> {
 }
 
 /// The numbers of a dataset before they are brought into one CRS.
+#[derive(Clone)]
 pub struct Numbers {
     found: Found,
     parts: Vec<Part>,
@@ -139,6 +141,7 @@ impl Numbers {
 }
 
 /// A geometry column of a layer. The labels and polylines of a layer belong to its first column.
+#[derive(Clone)]
 struct Part {
     layer: String,
     crs: Option<CoordinateSystem>,
@@ -154,14 +157,20 @@ struct Found {
     labels: Vec<Label>,
     polylines: Vec<Polyline>,
     features: BTreeMap<usize, u64>,
+    /// Whether polygons are kept feature by feature.
+    keeps_areas: bool,
 }
 
 impl Found {
     fn survey(self, crs: Option<CoordinateSystem>, keeps_geometries: bool) -> Result<Survey> {
-        let Found { mut chains, labels, polylines, features } = self;
+        let Found { mut chains, labels, polylines, features, keeps_areas } = self;
         let coords = std::mem::take(&mut chains.coords);
         let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
-        let data = MapData { labels, polylines, ..data };
+        let areas = match keeps_areas {
+            true => Areas::new(&indices, &chains.starts, chains.chain_kinds(), &chains.firsts),
+            false => Areas::default(),
+        };
+        let data = MapData { areas, labels, polylines, ..data };
         let ground = match crs::ground(crs.as_ref(), &data.vertices) {
             Ok(ground) => Some(ground),
             Err(Error::NoCrs) => None,
@@ -186,7 +195,9 @@ struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     fn over(dataset: &Dataset, selection: &'a Selection<'a>, in_one_crs: bool) -> Result<Self> {
-        let mut walk = Walk { selection, in_one_crs, crs: None, found: Found::default(), parts: Vec::new() };
+        let keeps_areas = !matches!(selection.labels, LabelFields::None);
+        let found = Found { keeps_areas, ..Found::default() };
+        let mut walk = Walk { selection, in_one_crs, crs: None, found, parts: Vec::new() };
         for (index, name) in &chosen_layers(dataset, selection.layers)? {
             let _turn = turn(dataset, name)?;
             let features = walk.layer(&mut dataset.layer(*index)?, name)?;

@@ -6,7 +6,8 @@ use crate::{
     decision::Decoys,
     matched::Matched,
     matching::{Matches, Radius},
-    observations::{self, Observations},
+    observations::{self, Chosen},
+    observed_on::Observations,
     progress::{Listener, Progress},
     tracking::{Followed, Tracking},
 };
@@ -15,6 +16,7 @@ use meshmark_core::{
     carrier::Carrier,
     deformation::{Deformation, Prediction},
     demodulation::{self, Demodulation},
+    derived::Observables,
     key::SecretKey,
     options::Parameters,
 };
@@ -40,12 +42,12 @@ pub struct Mark<'a> {
 }
 
 impl Matched<'_> {
-    /// Returns whether no more vertices match than by chance, and, for the joint demodulator, lines
-    /// show no more corners than by chance and no deformation can be followed; demodulation is
+    /// Returns whether no more vertices match than by chance, and, for the joint demodulator, nothing
+    /// else is observed more often than by chance and no deformation can be followed; demodulation is
     /// impossible then.
     pub fn is_chance(&self, demodulator: Demodulator) -> bool {
-        let is_followed = || observations::corners_show(self) || self.grown().is_some();
-        self.is_chance_of_vertices() && !(demodulator == Demodulator::Joint && is_followed())
+        let is_read_otherwise = || observations::show(self) || self.grown().is_some();
+        self.is_chance_of_vertices() && !(demodulator == Demodulator::Joint && is_read_otherwise())
     }
 
     /// Demodulates with a key. The paper's demodulator uses the matches unchanged; the joint one
@@ -86,11 +88,15 @@ impl Matched<'_> {
         listener(Progress::Stage { stage: "deformation", steps: 0 });
         let carriers = self.reference.carriers;
         let followed = Tracking::new(self).follow(carriers, parameters)?;
-        let (followed, observations) = observations::choose(self, followed, carriers, parameters, given)?;
+        let chosen = observations::choose(self, followed, carriers, parameters, given)?;
+        let Chosen { derived, followed, observations } = chosen;
         let Followed { radius, matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });
-        let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
+        let of = derived.as_ref().map_or(Observables::Vertices(patches), Observables::Derived);
+        let found = demodulation::joint(of, &carrier, &observed, bits, parameters, &disturbance, &step)?;
         let Prediction { deformation, weights, .. } = disturbance;
+        // Points of features have no weight of a vertex.
+        let weights = if derived.is_some() { vec![1.0; patches.vertex_count()] } else { weights };
         Ok(self.demodulated(found, (radius, matches), Some(deformation), weights, observations))
     }
 

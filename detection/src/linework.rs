@@ -29,6 +29,11 @@ impl Plane {
         [0, 1].map(|axis| (place[axis] - self.centre[axis]) * self.unit_m[axis])
     }
 
+    /// Returns the place, CRS units, of a point of the plane.
+    pub fn place(&self, at: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| self.centre[axis] + at[axis] / self.unit_m[axis])
+    }
+
     /// Indexes segments between vertices at these places, CRS units.
     pub fn tree(&self, coords: &[[f64; 2]], segments: impl Iterator<Item = [u32; 2]>) -> RTree<Edge> {
         let edge = |ends: [u32; 2]| {
@@ -37,4 +42,11 @@ impl Plane {
         };
         RTree::bulk_load(segments.map(edge).collect())
     }
+}
+
+/// Returns which of `vertices` vertices are in no segment.
+pub fn is_alone(vertices: usize, segments: &[[u32; 2]]) -> Vec<bool> {
+    let mut alone = vec![true; vertices];
+    segments.as_flattened().iter().for_each(|&vertex| alone[vertex as usize] = false);
+    alone
 }

@@ -1,27 +1,29 @@
-//! What is observed of the reference vertices: matched vertices, or the corners of lines drawn
-//! anew. The choice follows from their information about the displacements, so no key is involved.
+//! What is observed of the reference vertices: matched vertices, the corners of lines drawn anew, or
+//! the points that stand for features. The choice follows from their information about the displacements, so no key is involved.
 
 use crate::{
     corners::{self, Corners, Lines},
+    features::{self, Features},
     matched::Matched,
-    matching::{LEAST_MATCHED, OUT_OF_PLACE, is_chance},
+    matching::{LEAST_MATCHED, Matches, OUT_OF_PLACE, Radius, is_chance},
+    observed_on::Observations,
     tracking::Followed,
 };
 use meshmark_core::{
     Result,
     deformation::{Deformation, Observed, Prediction, mark_deviation_m},
+    derived::{DerivedPoints, Observables},
     options::Parameters,
 };
-use serde::Serialize;
 
-/// What the displacements of the reference vertices were observed on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Observations {
-    /// On matched vertices of the suspect.
-    Vertices,
-    /// On the corners between edges of the reference on which lines of the suspect lie.
-    Corners,
+/// The displacements to demodulate.
+pub struct Chosen<'a> {
+    /// The points that are observed in place of the vertices.
+    pub derived: Option<DerivedPoints<'a>>,
+    /// The displacements of the observed points.
+    pub followed: Followed,
+    /// What was observed.
+    pub observations: Observations,
 }
 
 /// Lines are looked for within this distance of their edges, metres.
@@ -41,21 +43,25 @@ const MOST_NEW: f64 = 1.0 / 3.0;
 const CLEARLY: f64 = 1.2;
 /// New vertices match by their nearness alone, and their information seems more than it is.
 const NEARLY: f64 = 0.5;
+/// A point whose displacement varies by this beside the function of its vertices weighs half,
+/// metres.
+const HALF_WEIGHT_M: f64 = 0.1;
 /// A deformation that changes over less than this many metres hides a mark like noise.
 const SMOOTH_M: f64 = 20.0;
 
-/// Chooses between the `followed` vertices and the corners of a suspect, unless the kind is
-/// `given`.
+/// Chooses between the `followed` vertices, the corners of a suspect and its features, unless the
+/// kind is `given`.
 ///
 /// # Errors
 /// Returns the errors of the estimation.
-pub fn choose(
-    matched: &Matched,
+pub fn choose<'a>(
+    matched: &Matched<'a>,
     followed: Followed,
     carriers: usize,
     parameters: &Parameters,
     given: Option<Observations>,
-) -> Result<(Followed, Observations)> {
+) -> Result<Chosen<'a>> {
+    let vertices = |followed| Chosen { derived: None, followed, observations: Observations::Vertices };
     let is_plain = match given {
         Some(kind) => kind == Observations::Vertices,
         None => {
@@ -64,28 +70,36 @@ pub fn choose(
         }
     };
     if is_plain {
-        return Ok((followed, Observations::Vertices));
+        return Ok(vertices(followed));
     }
+    let is_wanted = |kind| given.is_none_or(|given| given == kind);
     let mut best: Option<(f64, Read)> = None;
-    for corners in all_corners(matched) {
-        let read = Read::new(matched, corners, carriers, parameters)?;
-        let seen = information(&read.observed, &read.followed.disturbance);
+    let mut take = |read: Read<'a>| {
+        let seen = information(&read.observed, &read.chosen.followed.disturbance);
         if best.as_ref().is_none_or(|(most, _)| seen > *most) {
             best = Some((seen, read));
         }
+    };
+    if is_wanted(Observations::Corners) {
+        for corners in all_corners(matched) {
+            take(Read::corners(matched, corners, carriers, parameters)?);
+        }
     }
-    let Some((seen, read)) = best else { return Ok((followed, Observations::Vertices)) };
+    for features in features::shown(matched).filter(|features| is_wanted(features.kind)) {
+        take(Read::features(matched, features, carriers, parameters)?);
+    }
+    let Some((seen, read)) = best else { return Ok(vertices(followed)) };
     let displaced = displaced(matched, &followed);
     let of_vertices = information(&displaced, &followed.disturbance);
-    if given.is_some() || seen > needed(matched, &displaced, &read.observed) * of_vertices {
-        return Ok((read.followed, Observations::Corners));
+    if given.is_some() || seen > needed(matched, &displaced, &read) * of_vertices {
+        return Ok(read.chosen);
     }
-    Ok((followed, Observations::Vertices))
+    Ok(vertices(followed))
 }
 
-/// Returns whether lines show more corners than by chance.
-pub fn corners_show(matched: &Matched) -> bool {
-    all_corners(matched).next().is_some()
+/// Returns whether lines show more corners, or points more features, than by chance.
+pub fn show(matched: &Matched) -> bool {
+    all_corners(matched).next().is_some() || features::shown(matched).next().is_some()
 }
 
 /// Returns the corners that lines within each tolerance show, unless they are chance.
@@ -100,16 +114,19 @@ fn all_corners(matched: &Matched) -> impl Iterator<Item = Corners> {
     })
 }
 
-/// Returns how many times the information of the vertices corners must have.
-fn needed(matched: &Matched, displaced: &Observed, corners: &Observed) -> f64 {
+/// Returns how many times the information of the vertices another reading must have.
+fn needed(matched: &Matched, displaced: &Observed, read: &Read) -> f64 {
     if matched.is_chance_of_vertices() {
         return 0.0;
+    }
+    if read.chosen.derived.is_some() {
+        return CLEARLY;
     }
     let gap = |(v, c): (&Option<[f64; 2]>, &Option<[f64; 2]>)| {
         let (v, c) = (v.as_ref()?, c.as_ref()?);
         Some((v[0] - c[0]).hypot(v[1] - c[1]))
     };
-    let gaps: Vec<f64> = displaced.iter().zip(corners).filter_map(gap).collect();
+    let gaps: Vec<f64> = displaced.iter().zip(&read.observed).filter_map(gap).collect();
     let same = gaps.iter().filter(|gap| **gap < SAME_M).count();
     if same as f64 > MOST_NEW * gaps.len() as f64 { CLEARLY } else { NEARLY }
 }
@@ -120,34 +137,80 @@ fn displaced(matched: &Matched, followed: &Followed) -> Vec<Option<[f64; 2]>> {
     followed.matches.displacements_m(coords, &matched.moved, &matched.reference.ground)
 }
 
-/// Corners that were read.
-struct Read {
+/// Corners or features that were read.
+struct Read<'a> {
     /// Their displacements without outliers, metres.
     observed: Vec<Option<[f64; 2]>>,
     /// The same with shaped noise, and the disturbance.
-    followed: Followed,
+    chosen: Chosen<'a>,
 }
 
-impl Read {
-    fn new(matched: &Matched, corners: Corners, carriers: usize, parameters: &Parameters) -> Result<Self> {
-        let (patches, amplitude_m) = (&matched.reference.patches, parameters.amplitude_m);
-        let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
-        let fit = |observed: &Observed| {
-            let deformation = Deformation::estimate(patches, observed, carriers, parameters)?;
-            Ok(deformation.predict(patches, observed, carriers, amplitude_m))
-        };
-        let prediction = fit(&corners.displacement_m)?;
-        let observed = prediction.without_outliers(&corners.displacement_m, mark_m);
-        let prediction = if observed == corners.displacement_m { prediction } else { fit(&observed)? };
-        let (shaped, mut disturbance) = prediction.shape_noise(patches, &observed, carriers, amplitude_m);
-        disturbance.weights.iter_mut().zip(&corners.weights).for_each(|(weight, corner)| *weight *= corner);
-        let followed = Followed {
+/// Displacements before outliers are removed.
+struct Raw<'a> {
+    observations: Observations,
+    derived: Option<DerivedPoints<'a>>,
+    displacement_m: Vec<Option<[f64; 2]>>,
+    weights: Vec<f64>,
+    radius: Radius,
+    matches: Matches,
+}
+
+impl<'a> Read<'a> {
+    fn corners(
+        matched: &Matched<'a>,
+        corners: Corners,
+        carriers: usize,
+        parameters: &Parameters,
+    ) -> Result<Self> {
+        let raw = Raw {
+            observations: Observations::Corners,
+            derived: None,
+            displacement_m: corners.displacement_m,
+            weights: corners.weights,
             radius: matched.radius,
             matches: matched.matches.clone(),
-            observed: shaped,
-            disturbance,
         };
-        Ok(Read { observed, followed })
+        Self::new(matched, raw, carriers, parameters)
+    }
+
+    fn features(
+        matched: &Matched<'a>,
+        features: Features,
+        carriers: usize,
+        parameters: &Parameters,
+    ) -> Result<Self> {
+        let patches = &matched.reference.patches;
+        let mark2 = mark_deviation_m(patches, carriers, parameters.amplitude_m).powi(2);
+        let derived = DerivedPoints::new(patches, features.shares());
+        let variances = derived.foreign_variance(mark2).zip(features.variance_m2());
+        let weights = variances.map(|(foreign, own)| 1.0 / (1.0 + (foreign + own) / HALF_WEIGHT_M.powi(2)));
+        let raw = Raw {
+            observations: features.kind,
+            weights: weights.collect(),
+            derived: Some(derived),
+            displacement_m: features.displacement_m,
+            radius: features.radius,
+            matches: Matches { suspect_of: vec![None; patches.vertex_count()], count: 0 },
+        };
+        Self::new(matched, raw, carriers, parameters)
+    }
+
+    fn new(matched: &Matched<'a>, raw: Raw<'a>, carriers: usize, parameters: &Parameters) -> Result<Self> {
+        let (patches, amplitude_m) = (&matched.reference.patches, parameters.amplitude_m);
+        let mark_m = mark_deviation_m(patches, carriers, amplitude_m);
+        let of = || raw.derived.as_ref().map_or(Observables::Vertices(patches), Observables::Derived);
+        let fit = |observed: &Observed| {
+            let deformation = Deformation::estimate(of(), observed, carriers, parameters)?;
+            Ok(deformation.predict(of(), observed, carriers, amplitude_m))
+        };
+        let prediction = fit(&raw.displacement_m)?;
+        let observed = prediction.without_outliers(&raw.displacement_m, mark_m);
+        let prediction = if observed == raw.displacement_m { prediction } else { fit(&observed)? };
+        let (shaped, mut disturbance) = prediction.shape_noise(patches, &observed, carriers, amplitude_m);
+        disturbance.weights.iter_mut().zip(&raw.weights).for_each(|(weight, own)| *weight *= own);
+        let followed = Followed { radius: raw.radius, matches: raw.matches, observed: shaped, disturbance };
+        let (derived, observations) = (raw.derived, raw.observations);
+        Ok(Read { observed, chosen: Chosen { derived, followed, observations } })
     }
 }
 

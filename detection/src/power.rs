@@ -2,7 +2,7 @@
 //!
 //! A trial mark under a derived key is applied to the suspect as if the suspect were made from
 //! a map with that mark: every vertex of the suspect moves as the nearest place on the linework of
-//! the reference does. Matching, tracking and demodulation are then repeated. The score of the
+//! the reference does, or the nearest feature, where features are observed. Matching, tracking and demodulation are then repeated. The score of the
 //! trial mark thus includes what the suspect lost: displacements beyond the matching radius,
 //! vertices that are new on old lines, noise. It needs no model of what happened to the suspect,
 //! and neither the tested key nor a message.
@@ -10,8 +10,10 @@
 use crate::{
     decision::{p_any_message_log10, shows_key},
     examination::{Demodulated, Demodulator, Mark},
-    linework::{Edge, Plane},
+    features,
+    linework::{Edge, Plane, is_alone},
     matched::{Matched, Reference},
+    observed_on::Observations,
     progress::Listener,
 };
 use meshmark_core::{
@@ -60,12 +62,9 @@ impl Power {
         let parameters = mark.parameters;
         let displacement_m =
             displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
-        let linework = LineIndex::new(matched.reference.data, &matched.reference.ground);
-        let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
-        let trial = {
-            let suspect = (matched.suspect, &matched.registration);
-            Matched::of_moved(matched.reference, suspect, moved, |_, _, _| matched.radius)
-        };
+        let moved = moved(matched, seen.observations, &displacement_m);
+        let suspect = (matched.suspect, &matched.registration);
+        let trial = Matched::of_moved(matched.reference, suspect, moved, |_, _, _| matched.radius);
         if trial.is_chance(demodulator) {
             return Ok(Power::Trial(0.0));
         }
@@ -87,6 +86,15 @@ fn trial_key(matched: &Matched) -> SecretKey {
     SecretKey::from_bytes(Sha256::digest(text).into())
 }
 
+/// Returns where the vertices of the suspect go when the vertices of the reference move, CRS units.
+fn moved(matched: &Matched, observed_on: Observations, displacement_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    if observed_on.is_of_features() {
+        return features::moved(matched, observed_on, displacement_m);
+    }
+    let linework = LineIndex::new(matched.reference.data, &matched.reference.ground);
+    matched.moved.par_iter().map(|&place| linework.moved(place, displacement_m)).collect()
+}
+
 /// The segments of a reference, and its vertices without a segment, in the plane.
 struct LineIndex<'a> {
     ground: &'a Ground,
@@ -98,8 +106,7 @@ impl<'a> LineIndex<'a> {
     fn new(reference: &'a MapData, ground: &'a Ground) -> Self {
         let (coords, centre) = (reference.vertices.coords(), reference.vertices.centre());
         let plane = Plane::new(ground, centre);
-        let mut alone = vec![true; coords.len()];
-        reference.segments.as_flattened().iter().for_each(|&vertex| alone[vertex as usize] = false);
+        let alone = is_alone(coords.len(), &reference.segments);
         let points = (0..coords.len() as u32).filter(|&vertex| alone[vertex as usize]).map(|v| [v, v]);
         let tree = plane.tree(coords, reference.segments.iter().copied().chain(points));
         LineIndex { ground, plane, tree }

@@ -5,7 +5,7 @@ use gdal::spatial_ref::SpatialRef;
 use geo::CoordsIter;
 use meshmark_core::message::Message;
 use meshmark_host_tests::{
-    attacks::{Map, deformation, features, reproject, similarity},
+    attacks::{Map, deformation, features, outlines::Outline, reproject, similarity},
     plugin::{Host, library},
 };
 use serde_json::{Value, json};
@@ -363,6 +363,30 @@ fn vertices_as_points_carry_the_message() {
     features::drop_attributes(&turned.unwrap()).write(&host.path("points.gpkg")).unwrap();
     let report = host.matches("map.gpkg", &["--record", "acme.json", "points.gpkg"]);
     assert_eq!(report["registration"]["method"], "geometry");
+}
+
+#[test]
+fn centroids_and_boxes_of_polygons_carry_the_message_wherever_and_in_whatever_crs_they_are() {
+    let host = marked("helsinki.gpkg", &[]);
+    host.run("ogr2ogr", &["-t_srs", "EPSG:4326", "degrees.gpkg", "marked.gpkg"]).succeeds();
+    let [map, unmarked, degrees] =
+        ["marked.gpkg", "map.gpkg", "degrees.gpkg"].map(|name| Map::read(&host.path(name)).unwrap());
+    for (outline, observed_on) in [(Outline::Centroid, "centroids"), (Outline::BoundingBox, "boxes")] {
+        let turned =
+            similarity::linear(&outline.apply(&map), similarity::rotation(30.0), similarity::About::Corner);
+        let turned = features::drop_attributes(&turned.unwrap());
+        for suspect in [outline.apply(&map), turned, outline.apply(&degrees)] {
+            suspect.write(&host.path("suspect.gpkg")).unwrap();
+            let report = host.matches("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+            assert_eq!(report["parameters"]["observations"], observed_on);
+            std::fs::remove_file(host.path("suspect.gpkg")).unwrap();
+        }
+        outline.apply(&unmarked).write(&host.path("suspect.gpkg")).unwrap();
+        let (run, report) = host.verify("map.gpkg", &["--record", "acme.json", "suspect.gpkg"]);
+        assert_eq!((run.code, &report["verdict"]), (Some(1), &Value::from("no-match")));
+        assert_eq!(report["parameters"]["observations"], observed_on);
+        std::fs::remove_file(host.path("suspect.gpkg")).unwrap();
+    }
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub struct Sample {
 
 /// The kinds of suspects: the name, whether it is marked, and the row of Table 2 by which it is
 /// attacked.
-const SUSPECTS: [(&str, bool, Option<&str>); 9] = [
+const SUSPECTS: [(&str, bool, Option<&str>); 11] = [
     ("marked", true, None),
     ("marked, noise ±50 cm", true, Some("9c")),
     ("marked, middle 1/16", true, Some("10-8")),
@@ -56,6 +56,8 @@ const SUSPECTS: [(&str, bool, Option<&str>); 9] = [
     ("marked, resampled every 2 m", true, Some("resampled2")),
     ("unmarked, noise ±10 cm", false, Some("9a")),
     ("unmarked, local deformation", false, Some("6")),
+    ("marked, centroids of the polygons alone", true, Some("centroids")),
+    ("marked, bounding boxes of the polygons alone", true, Some("boxes")),
 ];
 
 /// Tests `count` wrong keys and as many wrong recipients on every suspect made of one map. The

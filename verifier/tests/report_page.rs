@@ -1,6 +1,9 @@
 //! The report as a page: whole, the same for the same input, and proof against what files say.
 
-use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::sql::Dialect};
+use gdal::{
+    Dataset, DatasetOptions, GdalOpenFlags,
+    vector::{LayerAccess, sql::Dialect},
+};
 use meshmark_verifier::ExitCode;
 use scraper::{Html, Selector};
 use std::{
@@ -219,6 +222,29 @@ fn odd_suspects_make_pages_too() {
             "{suspect}"
         );
     }
+}
+
+#[test]
+fn a_page_on_boxes_says_what_the_finding_rests_on() {
+    let folder = folder();
+    let marked = Dataset::open(folder.path().join("marked.gpkg")).unwrap();
+    let mut table = String::from("id;WKT\n");
+    for (number, mut layer) in marked.layers().enumerate() {
+        for feature in layer.features() {
+            let geometry = feature.geometry().unwrap();
+            if geometry.geometry_type() % 1000 == 3 {
+                let e = geometry.envelope();
+                let corners = [(e.MinX, e.MinY), (e.MaxX, e.MinY), (e.MaxX, e.MaxY), (e.MinX, e.MaxY)];
+                let ring = [&corners[..], &corners[..1]].concat();
+                let ring: Vec<String> = ring.iter().map(|(x, y)| format!("{x} {y}")).collect();
+                table += &format!("{number};POLYGON (({}))\n", ring.join(", "));
+            }
+        }
+    }
+    fs::write(folder.path().join("boxes.csv"), table).unwrap();
+    let text = words(&page(folder.path(), &[&VERIFY[..], &RECORD, &["boxes.csv"]].concat()));
+    assert!(text.contains("the finding rests on one centroid or one box for each polygon"), "{text}");
+    assert!(text.contains("Observed onboxes") && !text.contains("a small part of the map"), "{text}");
 }
 
 #[test]

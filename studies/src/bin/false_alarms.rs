@@ -15,7 +15,7 @@ struct Arguments {
     /// Folder for false_alarms.md, .json and .svg
     #[arg(long, default_value = "false_alarms")]
     out: PathBuf,
-    /// Wrong keys, and as many wrong recipients, for each of nine suspects a map
+    /// Wrong keys, and as many wrong recipients, for each of eleven suspects a map
     #[arg(long, default_value_t = 200)]
     count: usize,
     /// Seed of keys and attacks

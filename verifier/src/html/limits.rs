@@ -4,7 +4,7 @@
 use super::page::{count, counted, section};
 use crate::report::{Report, explain};
 use maud::{Markup, html};
-use meshmark_detection::decision::Verdict;
+use meshmark_detection::{Observations, decision::Verdict};
 
 pub fn limits(report: &Report) -> Markup {
     html! {
@@ -77,7 +77,13 @@ fn weaknesses(report: &Report) -> Vec<String> {
 fn seen(report: &Report) -> Vec<String> {
     let mut found = Vec::new();
     let v = &report.vertices;
-    if 10 * v.matched < v.reference {
+    let has_features = report.parameters.observations.is_some_and(Observations::is_of_features);
+    if has_features {
+        found.push(
+            "The suspect has no vertices of the reference: the finding rests on one centroid or one box for each polygon."
+                .into(),
+        );
+    } else if 10 * v.matched < v.reference {
         found.push(format!(
             "Only {} of {} of the reference were found: the finding rests on a small part of the map.",
             count(v.matched),

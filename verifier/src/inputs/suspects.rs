@@ -14,6 +14,7 @@ use std::{
 };
 
 /// A suspect after reading.
+#[derive(Clone)]
 pub struct Suspect {
     /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
     /// in its own; otherwise the numbers of the file.

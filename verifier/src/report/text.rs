@@ -88,6 +88,12 @@ impl Report {
             Some(Observations::Corners) => {
                 "; its lines were drawn anew, so the displacements are those of corners between its lines"
             }
+            Some(Observations::Centroids) => {
+                "; the displacements are those of the centroids of polygons, which its points are"
+            }
+            Some(Observations::Boxes) => {
+                "; the displacements are those of the bounding boxes of polygons, which its rings are"
+            }
             Some(Observations::Vertices) | None => "",
         }
     }

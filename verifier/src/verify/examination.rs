@@ -19,6 +19,7 @@ use meshmark_dataset::{CoordinateSystem, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Observations, Reference,
     decision::{Decision, Decoys, Expected, decide_among},
+    maps_of_features,
     matching::{LEAST_MATCHED, Radius},
     power::Power,
     registration::{Registrar, Registration, Start},
@@ -138,6 +139,8 @@ fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) 
     suspects::suspect(&request.suspect, reference)
 }
 
+/// Registers a suspect on the vertices of its reference, or on the points of its features where it
+/// consists of such points.
 fn register(
     request: &Request,
     (reference, compared): (&Survey, &Reference),
@@ -145,9 +148,27 @@ fn register(
     progress: &mut Progress,
 ) -> Result<Registered> {
     progress.start("registration", 0);
-    let registrar = Registrar::new(&reference.data, &compared.ground, request.radius.least_m());
-    let registered = crs_search::register(&registrar, reference, suspect, request.registration);
-    registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
+    let registrar_of = |map| Registrar::new(map, &compared.ground, request.radius.least_m());
+    let onto = |map, suspect: Suspect| {
+        let registered = crs_search::register(&registrar_of(map), reference, suspect, request.registration);
+        registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
+    };
+    let maps_of_features = maps_of_features(&reference.data, &compared.ground, &suspect.map.data)?;
+    if request.registration == Start::Auto && suspect.numbers.is_some() {
+        let in_place = |map| registrar_of(map).refine_in_place(&suspect.map.data);
+        if let Some(registration) = maps_of_features.iter().map(in_place).find(Registration::agrees) {
+            return Ok(Registered { map: suspect.map, registration });
+        }
+    }
+    let again = (!maps_of_features.is_empty()).then(|| suspect.clone());
+    let mut best = onto(&reference.data, suspect)?;
+    for (map, suspect) in maps_of_features.iter().zip(again.iter().cycle()) {
+        if !best.registration.agrees() {
+            let next = onto(map, suspect.clone())?;
+            best = if next.registration.share > best.registration.share { next } else { best };
+        }
+    }
+    Ok(best)
 }
 
 /// Demodulates what matches, and measures what a present mark would show; nothing where matches are
