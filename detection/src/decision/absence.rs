@@ -3,7 +3,7 @@
 //! missed.
 
 use super::{
-    survival,
+    rivals, survival,
     verdict::{MARK, Verdict},
 };
 use crate::power::Power;
@@ -59,10 +59,39 @@ impl Unmatched<'_> {
         Absence { verdict, reason, p_missed_log10: missed }
     }
 
+    /// Decides for a suspect that carries a mark of the key while another message explains it as
+    /// well or better. A copy of the expected message is missed with at most the p-value of the
+    /// decoded one, whose null hypothesis is any other message.
+    pub fn another_message(&self) -> Absence {
+        let decoded = self.found.message();
+        let standing = rivals::standing(self.found, &decoded);
+        let p_missed_log10 = standing.p_log10.max(LEAST_MISSED_LOG10);
+        let stands_alone = standing.p_log10 < self.each.log10() && !standing.is_mixed;
+        let is_no_match = stands_alone && !self.is_suspicious() && p_missed_log10 < MOST_MISSED_LOG10;
+        let (verdict, reason) = match is_no_match {
+            true => (
+                Verdict::NoMatch,
+                format!("a mark of this key is there, and it carries another message, {}", decoded.to_hex()),
+            ),
+            false => (
+                Verdict::Inconclusive,
+                "a mark of this key is there, but a message that differs in few bits explains it as well, and a message \
+                 that was not whitened names nobody then"
+                    .into(),
+            ),
+        };
+        Absence { verdict, reason, p_missed_log10 }
+    }
+
+    /// Returns whether chance rarely gives so much evidence.
+    fn is_suspicious(&self) -> bool {
+        let [alone, of_all] = self.p_log10;
+        of_all < SUSPICIOUS_LOG10 || alone < self.significance.log10()
+    }
+
     /// Returns why the verdict cannot be "no match", and what would help; `None` where it can.
     fn doubt(&self, needed: f64, missed: f64) -> Option<String> {
         let (bits, each) = (self.bits, self.each);
-        let [alone, of_all] = self.p_log10;
         let least_root = needed + survival::normal_quantile(10f64.powf(MOST_MISSED_LOG10)) * LEAST_DEVIATION;
         if (self.found.estimate.len() as f64).sqrt() <= least_root {
             return Some(format!(
@@ -71,7 +100,7 @@ impl Unmatched<'_> {
                 (least_root.powi(2) as usize + 1).next_multiple_of(4)
             ));
         }
-        if of_all < SUSPICIOUS_LOG10 || alone < self.significance.log10() {
+        if self.is_suspicious() {
             return Some(
                 "the evidence for this mark is weak, but stronger than chance usually gives: a larger piece of the \
                  suspect, or the edition of the reference that was marked, would show more"

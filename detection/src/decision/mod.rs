@@ -166,12 +166,11 @@ pub fn decide_among(
              {significance:e}"
         );
         (Verdict::Match, reason)
-    } else if fits(p_random) {
-        another_message(found, each)
     } else {
         let alone = p_mark.max(p_recipient);
         let p_log10 = [alone, alone + (tried as f64).log10()];
-        let absence = Unmatched { found, power, bits, each, significance, p_log10 }.decide();
+        let unmatched = Unmatched { found, power, bits, each, significance, p_log10 };
+        let absence = if fits(p_random) { unmatched.another_message() } else { unmatched.decide() };
         p_missed_log10 = Some(absence.p_missed_log10);
         (absence.verdict, absence.reason)
     };
@@ -182,25 +181,6 @@ pub fn decide_among(
         p_recipient_log10: Some(p_recipient),
         p_missed_log10,
         tried,
-    }
-}
-
-/// Decides for a suspect that carries a mark of the key while another message explains it as well
-/// or better.
-fn another_message(found: &Demodulation, each: f64) -> (Verdict, String) {
-    let decoded = found.message();
-    let standing = rivals::standing(found, &decoded);
-    match standing.p_log10 < each.log10() && !standing.is_mixed {
-        true => (
-            Verdict::NoMatch,
-            format!("a mark of this key is there, and it carries another message, {}", decoded.to_hex()),
-        ),
-        false => (
-            Verdict::Inconclusive,
-            "a mark of this key is there, but a message that differs in few bits explains it as well, and a message \
-             that was not whitened names nobody then"
-                .into(),
-        ),
     }
 }
 
@@ -358,6 +338,10 @@ mod tests {
         let neighbour = of(&two, Null::AnyOtherMessage);
         assert_eq!(neighbour.verdict, Verdict::NoMatch);
         assert!(neighbour.p_value_log10().unwrap() > -1.0, "its null hypothesis holds: {neighbour:?}");
+        assert!(
+            neighbour.p_missed_log10.unwrap() < -3.0,
+            "its copy would not carry the other: {neighbour:?}"
+        );
         assert_eq!(of(&two, Null::RandomMessage).verdict, Verdict::Match, "which is what whitening is for");
     }
 }
