@@ -14,9 +14,11 @@ pub enum Error {
     TooFewVertices { vertices: usize, patch_size: usize, code: Code, chip_rate: usize },
     Collinear { vertices: usize },
     TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize, of: usize },
+    TooManySigns { coefficients: usize, vertices: usize, of: usize },
     CodeLength { bits: usize },
     PrecisionTooCoarse { precision: f64, metres: f64, tolerance_m: f64 },
     MessageLost { errors: usize, bits: usize },
+    FingerprintLost { score: f64, least: f64 },
     NoConvergence { vertices: usize },
     Message(String),
     Key(String),
@@ -66,6 +68,16 @@ impl Error {
             Error::TooManyCoefficients { code, bits, chip_rate, vertices, of } => {
                 too_many(*code, *bits, *chip_rate, (*vertices, *of), spelling)
             }
+            Error::TooManySigns { coefficients, vertices, of } => format!(
+                "a recipient needs {coefficients} coefficients in every patch, but the smallest patch ({vertices} vertices) \
+                 has {}: use {}",
+                vertices - 1,
+                match of > coefficients {
+                    true => format!("a larger {}", name("PATCH_SIZE")),
+                    false =>
+                        format!("a map of more than {coefficients} vertices, or mark more layers together"),
+                }
+            ),
             Error::CodeLength { bits } => format!(
                 "{} carries a message of exactly 128 bits, not {bits}: use 32 hexadecimal digits, a {}, or {}",
                 spelling.value("CODE", "LDPC"),
@@ -85,6 +97,13 @@ impl Error {
                 name("AMPLITUDE"),
                 name("CHIP_RATE"),
                 name("PATCH_SIZE"),
+                name("PRECISION"),
+                name("TOLERANCE")
+            ),
+            Error::FingerprintLost { score, least } => format!(
+                "after marking, the signs of the recipient agree by {score:.1} standard deviations, and {least} are \
+                 needed: raise {}, use a finer {} or a larger {}, or mark more layers together",
+                name("AMPLITUDE"),
                 name("PRECISION"),
                 name("TOLERANCE")
             ),

@@ -36,6 +36,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod agreement;
 pub mod bodies;
 pub mod carrier;
 pub mod code;
@@ -47,6 +48,8 @@ pub mod disjoint_sets;
 pub mod distortion;
 pub mod embedding;
 mod error;
+pub mod estimation;
+pub mod fingerprint;
 pub mod ground;
 pub mod hex;
 pub mod junctions;
@@ -61,12 +64,14 @@ mod nearness;
 pub mod noise_law;
 pub mod options;
 pub mod orientation;
+pub mod part;
 pub mod patches;
 mod placement;
 pub mod record;
 mod response;
 pub mod scale;
 mod sides;
+pub mod signs;
 pub mod spectrum;
 mod topology;
 mod tridiagonal;

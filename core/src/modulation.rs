@@ -7,38 +7,51 @@ use crate::{
     options::Parameters,
     patches::{Patch, Patches},
     response::Response,
+    signs::Signs,
     spectrum::Basis,
 };
 use rayon::prelude::*;
 
-/// Returns the coefficients that modulate a message, metres: α p_i b′_j for every chip, where
-/// `signs` are the channel bits b′.
-pub(crate) fn coefficients_m(chips: &[f64], signs: &[f64], parameters: &Parameters) -> Vec<f64> {
-    let modulate = |(i, chip): (usize, &f64)| {
-        parameters.amplitude_m * chip * signs[bit_of_coefficient(i + 1, parameters.chip_rate)]
-    };
-    chips.iter().enumerate().map(modulate).collect()
+/// A message as signs: p_i b′_j for every chip of the carrier.
+pub struct SpreadMessage<'a> {
+    carrier: &'a Carrier,
+    /// The channel bits b′.
+    bits: Vec<f64>,
+    chip_rate: usize,
+}
+
+impl<'a> SpreadMessage<'a> {
+    /// Codes and spreads a message.
+    pub fn new(carrier: &'a Carrier, message: &Message, parameters: &Parameters) -> Self {
+        SpreadMessage { carrier, bits: parameters.code.encode(message), chip_rate: parameters.chip_rate }
+    }
+}
+
+impl Signs for SpreadMessage<'_> {
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        let chips = self.carrier.chips(patch, axis, count).into_iter().enumerate();
+        chips.map(|(i, chip)| chip * self.bits[bit_of_coefficient(i + 1, self.chip_rate)]).collect()
+    }
 }
 
 /// Returns the displacement of every vertex in canonical order by a mark of full amplitude, metres:
-/// α p ∘ b′ on both axes of every patch. T-junctions and bodies follow as in [`crate::embedding`];
-/// tolerance, grid and the neighbourhood of a vertex are not considered.
+/// α times the `signs` of `coefficients` coefficients on both axes of every patch. T-junctions and
+/// bodies follow as in [`crate::embedding`]; tolerance, grid and the neighbourhood of a vertex are
+/// not considered.
 ///
 /// # Errors
-/// Returns the errors of [`Patches::carriers`], and fails when a patch cannot be solved.
+/// Fails when a patch cannot be solved.
 pub fn displacements_m(
     patches: &Patches,
-    carrier: &Carrier,
-    message: &Message,
+    signs: &dyn Signs,
+    coefficients: usize,
     parameters: &Parameters,
 ) -> Result<Vec<[f64; 2]>> {
-    let carriers = patches.carriers(message.len(), parameters)?;
-    let signs = parameters.code.encode(message);
     let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<[f64; 2]>> {
-        let basis = Basis::low_frequencies(patch, carriers + 1)?;
+        let basis = Basis::low_frequencies(patch, coefficients + 1)?;
         let coefficients = [0, 1].map(|axis| {
-            let chips = carrier.chips(number, axis, carriers);
-            coefficients_m(&chips, &signs, parameters)
+            let signs = signs.signs(number, axis, coefficients);
+            signs.iter().map(|sign| parameters.amplitude_m * sign).collect()
         });
         Ok(Response::carriers(patch, &basis, parameters.shape).synthesise(&coefficients))
     };
@@ -80,7 +93,10 @@ mod tests {
         for (shape, most_m) in [(Rigidity::Free, 1e-9), (Rigidity::Rigid, 5e-3)] {
             let parameters = Parameters { shape, ..Parameters::default() };
             let patches = Patches::new(&map, &parameters).unwrap();
-            let planned = displacements_m(&patches, &Carrier::new(&key), &message, &parameters).unwrap();
+            let carrier = Carrier::new(&key);
+            let signs = SpreadMessage::new(&carrier, &message, &parameters);
+            let carriers = patches.carriers(message.len(), &parameters).unwrap();
+            let planned = displacements_m(&patches, &signs, carriers, &parameters).unwrap();
             let marked = embed(&map, &key, &message, &parameters).unwrap();
             let miss = |((from, to), by): ((&[f64; 2], &[f64; 2]), &[f64; 2])| {
                 (to[0] - from[0] - by[0]).hypot(to[1] - from[1] - by[1])

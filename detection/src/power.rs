@@ -15,8 +15,13 @@ use crate::{
     progress::Listener,
 };
 use meshmark_core::{
-    Result, carrier::Carrier, ground::Ground, key::SecretKey, map_data::MapData, message::Message,
-    modulation::displacements_m,
+    Result,
+    carrier::Carrier,
+    ground::Ground,
+    key::SecretKey,
+    map_data::MapData,
+    message::Message,
+    modulation::{SpreadMessage, displacements_m},
 };
 use rayon::prelude::*;
 use rstar::RTree;
@@ -58,8 +63,10 @@ impl Power {
         let key = trial_key(matched);
         let message = Message::from_signs(&vec![1.0; mark.bits]);
         let parameters = mark.parameters;
-        let displacement_m =
-            displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
+        let Reference { patches, carriers, .. } = matched.reference;
+        let carrier = Carrier::new(&key);
+        let signs = SpreadMessage::new(&carrier, &message, parameters);
+        let displacement_m = displacements_m(patches, &signs, *carriers, parameters)?;
         let linework = Linework::new(matched.reference.data, &matched.reference.ground);
         let moved = matched.moved.par_iter().map(|&place| linework.moved(place, &displacement_m)).collect();
         let trial = Matched::of_moved(matched.reference, matched.suspect, moved, |_, _, _| matched.radius);

@@ -49,7 +49,7 @@ pub fn key() -> SecretKey {
 ///
 /// # Panics
 /// When it cannot be read: the kit is then of no use.
-fn read(path: &Path) -> Survey {
+pub(crate) fn read(path: &Path) -> Survey {
     let dataset = Dataset::open(path).expect("a map GDAL opens");
     survey(&dataset, &Selection::default()).expect("a map of one CRS")
 }
@@ -244,7 +244,7 @@ fn ring() -> Value {
     })
 }
 
-fn plus_minus(chips: &[f64]) -> String {
+pub(crate) fn plus_minus(chips: &[f64]) -> String {
     chips.iter().map(|chip| if *chip > 0.0 { '+' } else { '-' }).collect()
 }
 

@@ -1,7 +1,10 @@
 //! Today's code makes the test vectors of fixtures/vectors again.
 
 use meshmark_core::{key::SecretKey, record::Record};
-use meshmark_host_tests::vectors::{self, ReferenceMarking, differences};
+use meshmark_host_tests::{
+    fingerprint_vectors,
+    vectors::{self, ReferenceMarking, differences},
+};
 use serde_json::{Value, json};
 use std::{fs, sync::LazyLock};
 
@@ -19,6 +22,16 @@ fn every_intermediate_value_is_as_written() {
     let written: Value = serde_json::from_str(&text("steps.json")).unwrap();
     let found = differences(&MARKING.steps(), &written, TOLERANCE);
     assert!(found.is_empty(), "{} differences: {:#?}", found.len(), &found[..found.len().min(20)]);
+}
+
+#[test]
+fn every_value_of_a_fingerprint_is_as_written() {
+    let written: Value = serde_json::from_str(&text("fingerprint.json")).unwrap();
+    let found = differences(&fingerprint_vectors::steps(), &written, TOLERANCE);
+    assert!(found.is_empty(), "{} differences: {found:#?}", found.len());
+    let agreement = &written["5_agreement"];
+    assert_eq!(agreement["recipient"]["agreeing"], agreement["recipient"]["signs"]);
+    assert!(agreement["other_recipient"]["score"].as_f64().unwrap().abs() < 5.0);
 }
 
 #[test]

@@ -1,10 +1,11 @@
-//! Makes fixtures/vectors again: key, record, marked map and the intermediate values.
+//! Makes fixtures/vectors again: key, record, marked map and the intermediate values of both
+//! versions of the mark.
 //!
 //! The marked map and the record come from the driver, through ogr2ogr, as a user makes them; build
 //! it first (`make build`).
 
 use meshmark_host_tests::{
-    Result,
+    Result, fingerprint_vectors,
     product::{Product, marking_arguments},
     vectors::{self, RECIPIENT, ReferenceMarking},
 };
@@ -22,7 +23,8 @@ fn main() -> Result<()> {
     fs::write(folder.join("key.json"), vectors::key().to_json().as_bytes())?;
     mark(&folder)?;
     let steps = vectors::to_text(&ReferenceMarking::new().steps());
-    Ok(fs::write(folder.join("steps.json"), steps)?)
+    fs::write(folder.join("steps.json"), steps)?;
+    Ok(fs::write(folder.join("fingerprint.json"), vectors::to_text(&fingerprint_vectors::steps()))?)
 }
 
 /// `ogr2ogr` through the driver, with a fixed date so that the same map has the same bytes.
