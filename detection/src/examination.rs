@@ -4,7 +4,7 @@
 
 use crate::{
     decision::Decoys,
-    matched::Matched,
+    matched::{Matched, Reference},
     matching::{Matches, Radius},
     observations::{self, Observations},
     progress::{Listener, Progress},
@@ -82,17 +82,27 @@ impl Matched<'_> {
             let matches = (self.radius, self.matches.clone());
             return Ok(self.demodulated(found, matches, None, weights, Observations::Vertices));
         }
-        listener(Progress::Stage { stage: "deformation", steps: 0 });
-        let maps = (self.reference.data, self.suspect);
-        let tracking = Tracking::new(maps, &self.moved, &self.reference.ground, patches);
-        let carriers = self.reference.carriers;
-        let followed = tracking.follow(carriers, parameters, self.radius)?;
-        let (followed, observations) = observations::choose(self, followed, carriers, parameters, given)?;
+        let (followed, observations) = self.observe(given, parameters, listener)?;
         let Followed { radius, matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });
         let found = demodulation::joint(patches, &carrier, &observed, bits, parameters, &disturbance, &step)?;
         let Prediction { deformation, weights, .. } = disturbance;
         Ok(self.demodulated(found, (radius, matches), Some(deformation), weights, observations))
+    }
+
+    /// Follows the deformation of the suspect on `given` observations, or on those with more
+    /// information.
+    pub(crate) fn observe(
+        &self,
+        given: Option<Observations>,
+        parameters: &Parameters,
+        listener: Listener,
+    ) -> Result<(Followed, Observations)> {
+        listener(Progress::Stage { stage: "deformation", steps: 0 });
+        let Reference { data, ground, patches, carriers, .. } = self.reference;
+        let tracking = Tracking::new((*data, self.suspect), &self.moved, ground, patches);
+        let followed = tracking.follow(*carriers, parameters, self.radius)?;
+        observations::choose(self, followed, *carriers, parameters, given)
     }
 
     fn demodulated(

@@ -52,6 +52,7 @@
 mod corners;
 pub mod decision;
 mod edges;
+mod estimated;
 mod examination;
 mod groups;
 mod histogram;
@@ -64,6 +65,7 @@ mod progress;
 pub mod registration;
 mod tracking;
 
+pub use estimated::Estimated;
 pub use examination::{Demodulated, Demodulator, Mark};
 pub use histogram::{Histogram, round_up};
 pub use matched::{Matched, Reference};

@@ -1,0 +1,101 @@
+//! The decision on fingerprints: one null hypothesis for all.
+//!
+//! *Was this recipient's copy used?* For a recipient who had no part in the suspect, the signs are
+//! random and independent of it, whatever happened to it, and under a wrong key they are so for
+//! everybody. The score T is then a weighted sum of independent random signs of variance 1, whose
+//! tail is bounded without any assumption about the weights ([`survival::signs_log10`]). Among many
+//! candidates, p is multiplied by their number (Bonferroni).
+//!
+//! *Who else?* In a mixture of copies everybody's share is noise for the others. Candidates that are
+//! certain are taken out, and the others are scored on what remains (joint decoding: P. Meerwald,
+//! T. Furon, *Towards joint Tardos decoding: the "Don Quixote" algorithm*, Information Hiding,
+//! LNCS 6958, 2011). What remains depends on the suspect and on those taken out alone, so that the
+//! signs of an innocent candidate are independent of it, too. Round m multiplies p by m (m + 1):
+//! the sum of 1 / (m (m + 1)) is 1, so that the significance is that of all rounds together.
+
+use super::survival;
+use meshmark_core::{
+    agreement::{Agreement, Evidence},
+    signs::Sequence,
+};
+use rayon::prelude::*;
+
+/// A mark of a key is detected, whoever its recipient is, where the p-value of the pilots is below
+/// 10 to this power.
+const DETECTED_LOG10: f64 = -9.0;
+/// More rounds name nobody else: every round needs stronger evidence.
+const MOST_ROUNDS: usize = 20;
+
+/// Returns log₁₀ of a bound of the probability of this score for a recipient, or for pilots, that
+/// have nothing to do with the suspect.
+pub fn p_log10(score: f64) -> f64 {
+    survival::signs_log10(score)
+}
+
+/// Returns the least score that a recipient, one of the `tried`, needs to be named.
+pub fn needed_score(tried: usize, significance: f64) -> f64 {
+    survival::signs_quantile(significance / (tried as f64 * 10f64.powf(rounds_log10(1, tried))))
+}
+
+/// Returns whether a mark of the key is detected, given the score of its pilots.
+pub fn shows_key(score: f64) -> bool {
+    p_log10(score) < DETECTED_LOG10
+}
+
+/// A candidate among all that were tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// The agreement with the whole suspect.
+    pub agreement: Agreement,
+    /// The score in the round of the smallest p-value, on what other recipients left.
+    pub score: f64,
+    /// The round of the smallest p-value, counted from 1: how often others were taken out, and 1.
+    pub round: usize,
+    /// log₁₀ of the smallest p-value of all rounds, times the number of candidates and the factor of
+    /// the round.
+    pub p_value_log10: f64,
+    /// Whether this p-value is below the significance.
+    pub is_named: bool,
+}
+
+/// Returns the standing of every candidate, in the order given.
+pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significance: f64) -> Vec<Standing> {
+    let tried = candidates.len();
+    let whole: Vec<Agreement> = candidates.par_iter().map(|signs| evidence.agreement(signs)).collect();
+    let standing = |agreement: &Agreement| {
+        let p_value_log10 = p_value_log10(agreement.score, 1, tried);
+        let is_named = p_value_log10 < significance.log10();
+        Standing { agreement: *agreement, score: agreement.score, round: 1, p_value_log10, is_named }
+    };
+    let mut standings: Vec<Standing> = whole.iter().map(standing).collect();
+    let mut taken_out = 0;
+    for round in 2..=MOST_ROUNDS {
+        let named: Vec<usize> = (0..tried).filter(|&k| standings[k].is_named).collect();
+        if named.len() == taken_out || named.len() == tried {
+            break;
+        }
+        taken_out = named.len();
+        let rest = evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>());
+        standings.par_iter_mut().zip(candidates).filter(|(standing, _)| !standing.is_named).for_each(
+            |(standing, signs)| {
+                let score = rest.agreement(signs).score;
+                let p_value_log10 = p_value_log10(score, round, tried);
+                if p_value_log10 < standing.p_value_log10 {
+                    let is_named = p_value_log10 < significance.log10();
+                    *standing = Standing { score, round, p_value_log10, is_named, ..*standing };
+                }
+            },
+        );
+    }
+    standings
+}
+
+/// Returns log₁₀ of the p-value of a score in a round among so many candidates.
+fn p_value_log10(score: f64, round: usize, tried: usize) -> f64 {
+    (p_log10(score) + (tried as f64).log10() + rounds_log10(round, tried)).min(0.0)
+}
+
+/// Returns log₁₀ of the factor of a round. A single candidate has no second round.
+fn rounds_log10(round: usize, tried: usize) -> f64 {
+    if tried == 1 { 0.0 } else { ((round * (round + 1)) as f64).log10() }
+}
