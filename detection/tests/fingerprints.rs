@@ -184,7 +184,7 @@ fn is_standard_normal(mut scores: Vec<f64>) -> bool {
 #[test]
 fn members_hidden_by_the_noise_of_others_are_named_after_those_are_taken_out() {
     // The second member gave one house in eighteen.
-    let mixed = mixture(2, |i, values| values[usize::from(i / 2 / HOUSE.len() % 18 == 0)]);
+    let mixed = mixture(2, |i, values| values[usize::from((i / 2 / HOUSE.len()).is_multiple_of(18))]);
     let evidence = Evidence::of_recipients(&estimated(mixed).estimates);
     let standings = name_recipients(&evidence, &candidates(), SIGNIFICANCE);
     let named: Vec<usize> = (0..CANDIDATES).filter(|&k| standings[k].is_named).collect();
