@@ -50,6 +50,7 @@ pub mod embedding;
 mod error;
 pub mod estimation;
 pub mod fingerprint;
+pub mod fingerprint_record;
 pub mod ground;
 pub mod hex;
 pub mod junctions;

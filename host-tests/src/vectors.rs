@@ -49,9 +49,9 @@ pub fn key() -> SecretKey {
 ///
 /// # Panics
 /// When it cannot be read: the kit is then of no use.
-pub(crate) fn read(path: &Path) -> Survey {
+pub(crate) fn read(path: &Path, selection: &Selection) -> Survey {
     let dataset = Dataset::open(path).expect("a map GDAL opens");
-    survey(&dataset, &Selection::default()).expect("a map of one CRS")
+    survey(&dataset, selection).expect("a map of one CRS")
 }
 
 /// Every coordinate of a map, feature by feature.
@@ -95,7 +95,7 @@ impl ReferenceMarking {
     /// # Panics
     /// When it cannot be marked.
     pub fn new() -> Self {
-        let map = read(&reference_path());
+        let map = read(&reference_path(), &Selection::default());
         let on_ground = map.map().expect("a projected CRS");
         let ground = on_ground.ground;
         let code = Code::Repetition;

@@ -24,7 +24,10 @@ fn main() -> Result<()> {
     mark(&folder)?;
     let steps = vectors::to_text(&ReferenceMarking::new().steps());
     fs::write(folder.join("steps.json"), steps)?;
-    Ok(fs::write(folder.join("fingerprint.json"), vectors::to_text(&fingerprint_vectors::steps()))?)
+    let (folder, (steps, record)) = (fingerprint_vectors::folder(), fingerprint_vectors::steps_and_record());
+    fs::create_dir_all(&folder)?;
+    fs::write(folder.join("steps.json"), vectors::to_text(&steps))?;
+    Ok(fs::write(folder.join("record.json"), record.to_json())?)
 }
 
 /// `ogr2ogr` through the driver, with a fixed date so that the same map has the same bytes.
