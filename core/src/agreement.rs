@@ -73,6 +73,24 @@ impl Evidence {
         (0..self.patches()).map(|patch| self.agreement_on(signs, patch..patch + 1)).collect()
     }
 
+    /// Returns the amplitude of secret signs that fits best, 1 for a mark of full amplitude.
+    pub fn amplitude(&self, signs: &Sequence) -> f64 {
+        ratio(dot(&self.pattern(signs), &self.values), dot(&self.shares, &self.shares))
+    }
+
+    /// Returns the expected score of the only recipient of a copy of this amplitude.
+    pub fn expected_score(&self, amplitude: f64) -> f64 {
+        amplitude * ratio(self.shares.iter().sum(), dot(&self.values, &self.values).sqrt())
+    }
+
+    /// Returns the energy of the estimates as a share of that of a copy of this amplitude. Of an
+    /// average of copies it is one part in as many.
+    pub fn fullness(&self, amplitude: f64) -> f64 {
+        // The estimates of a copy have mean β (1 − v) s and variance v (1 − v).
+        let of_copy = |share: &f64| (amplitude * share).powi(2) + share * (1.0 - share);
+        ratio(dot(&self.values, &self.values), self.shares.iter().map(of_copy).sum())
+    }
+
     /// Returns the number of patches.
     pub fn patches(&self) -> usize {
         self.values.len() / self.coefficients / 2
@@ -97,8 +115,7 @@ impl Evidence {
                 }
             }
         }
-        let score = if energy > 0.0 { sum / energy.sqrt() } else { 0.0 };
-        Agreement { score, signs: count, agreeing }
+        Agreement { score: ratio(sum, f64::sqrt(energy)), signs: count, agreeing }
     }
 
     /// Returns what remains when the shares of some recipients are taken out: Σ_k β_k (1 − v) s_k,
@@ -106,14 +123,10 @@ impl Evidence {
     /// it, too.
     pub fn without(&self, recipients: &[Sequence]) -> Self {
         let mut rest = self.clone();
-        let energy: f64 = self.shares.iter().map(|share| share * share).sum();
-        if energy == 0.0 {
-            return rest;
-        }
+        let energy = dot(&self.shares, &self.shares);
         for signs in std::iter::repeat_n(recipients, ROUNDS).flatten() {
             let pattern = self.pattern(signs);
-            let product: f64 = pattern.iter().zip(&rest.values).map(|(p, value)| p * value).sum();
-            let amplitude = product / energy;
+            let amplitude = ratio(dot(&pattern, &rest.values), energy);
             rest.values.iter_mut().zip(&pattern).for_each(|(value, p)| *value -= amplitude * p);
         }
         rest
@@ -133,6 +146,14 @@ impl Evidence {
     fn axis<'a>(&self, of_all: &'a [f64], patch: usize, axis: usize) -> &'a [f64] {
         &of_all[(2 * patch + axis) * self.coefficients..][..self.coefficients]
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn ratio(a: f64, b: f64) -> f64 {
+    if b > 0.0 { a / b } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -220,6 +241,21 @@ mod tests {
         assert_eq!(each.iter().map(|patch| patch.signs).sum::<usize>(), whole.signs);
         let mosaic = each.iter().filter(|patch| patch.signs > 0).all(|patch| patch.agreeing == patch.signs);
         assert!(mosaic);
+    }
+
+    #[test]
+    fn the_amplitude_and_the_energy_of_a_copy_are_those_of_a_mark_and_of_an_average_less() {
+        let (one, four) = (&mean_of(&[1]), &mean_of(&[1, 2, 3, 4]));
+        let [one, four] = [one, four].map(Evidence::of_recipients);
+        assert!((one.amplitude(&sequence(1)) - 1.0).abs() < 1e-12);
+        assert!((four.amplitude(&sequence(1)) - 0.25).abs() < 0.05);
+        assert!((one.amplitude(&sequence(9))).abs() < 0.1);
+        assert!((one.expected_score(1.0) - one.agreement(&sequence(1)).score).abs() < 1e-9);
+        assert!((four.fullness(1.0) / one.fullness(1.0) - 0.25).abs() < 0.02);
+        let nothing = Estimates { values: vec![0.0; 4000], variances: vec![1.0; 4000], ..mean_of(&[1]) };
+        let nothing = Evidence::of_recipients(&nothing);
+        let all = [nothing.amplitude(&sequence(1)), nothing.expected_score(1.0), nothing.fullness(1.0)];
+        assert_eq!(all, [0.0; 3]);
     }
 
     #[test]
