@@ -78,9 +78,14 @@ impl Evidence {
         ratio(dot(&self.pattern(signs), &self.values), dot(&self.shares, &self.shares))
     }
 
+    /// Returns Σ ŝ_i².
+    pub fn energy(&self) -> f64 {
+        dot(&self.values, &self.values)
+    }
+
     /// Returns the expected score of the only recipient of a copy of this amplitude.
     pub fn expected_score(&self, amplitude: f64) -> f64 {
-        amplitude * ratio(self.shares.iter().sum(), dot(&self.values, &self.values).sqrt())
+        amplitude * ratio(self.shares.iter().sum(), self.energy().sqrt())
     }
 
     /// Returns the energy of the estimates as a share of that of a copy of this amplitude. Of an
@@ -88,7 +93,7 @@ impl Evidence {
     pub fn fullness(&self, amplitude: f64) -> f64 {
         // The estimates of a copy have mean β (1 − v) s and variance v (1 − v).
         let of_copy = |share: &f64| (amplitude * share).powi(2) + share * (1.0 - share);
-        ratio(dot(&self.values, &self.values), self.shares.iter().map(of_copy).sum())
+        ratio(self.energy(), self.shares.iter().map(of_copy).sum())
     }
 
     /// Returns the number of patches.
@@ -268,7 +273,7 @@ mod tests {
         }
         assert!(score(&rest, 1).abs() < 1.0);
         let nobody = rest.without(&[sequence(2), sequence(3)]);
-        let energy = |evidence: &Evidence| evidence.values.iter().map(|v| v * v).sum::<f64>();
-        assert!(energy(&nobody) < 1e-3 * energy(&evidence), "{} {}", energy(&nobody), energy(&evidence));
+        let [left, all] = [nobody.energy(), evidence.energy()];
+        assert!(left < 1e-3 * all, "{left} {all}");
     }
 }

@@ -34,32 +34,38 @@ impl Signs for SpreadMessage<'_> {
     }
 }
 
-/// Returns the displacement of every vertex in canonical order by a mark of full amplitude, metres:
-/// α times the `signs` of `coefficients` coefficients on both axes of every patch. T-junctions and
-/// bodies follow as in [`crate::embedding`]; tolerance, grid and the neighbourhood of a vertex are
-/// not considered.
+/// Returns the displacements by marks of full amplitude, metres, for each those of all vertices in
+/// canonical order: α times the signs of `coefficients` coefficients on both axes of every patch.
+/// Every patch is solved once for all marks. T-junctions and bodies follow as in
+/// [`crate::embedding`]; tolerance, grid and the neighbourhood of a vertex are not considered.
 ///
 /// # Errors
 /// Fails when a patch cannot be solved.
-pub fn displacements_m(
+pub fn displacements_m<S: Signs>(
     patches: &Patches,
-    signs: &dyn Signs,
+    marks: &[S],
     coefficients: usize,
     parameters: &Parameters,
-) -> Result<Vec<[f64; 2]>> {
-    let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<[f64; 2]>> {
+) -> Result<Vec<Vec<[f64; 2]>>> {
+    let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<Vec<[f64; 2]>>> {
         let basis = Basis::low_frequencies(patch, coefficients + 1)?;
-        let coefficients = [0, 1].map(|axis| {
-            let signs = signs.signs(number, axis, coefficients);
-            signs.iter().map(|sign| parameters.amplitude_m * sign).collect()
-        });
-        Ok(Response::carriers(patch, &basis, parameters.shape).synthesise(&coefficients))
+        let response = Response::carriers(patch, &basis, parameters.shape);
+        let of_mark = |mark: &S| {
+            response.synthesise(&[0, 1].map(|axis| {
+                let signs = mark.signs(number, axis, coefficients);
+                signs.iter().map(|sign| parameters.amplitude_m * sign).collect()
+            }))
+        };
+        Ok(marks.iter().map(of_mark).collect())
     };
     let each = patches.as_slice().par_iter().enumerate().map(of_patch).collect::<Result<Vec<_>>>()?;
-    let mut all = vec![[0.0; 2]; patches.vertex_count()];
-    for (patch, displacements) in patches.as_slice().iter().zip(each) {
-        let own = patch.vertices.iter().enumerate().filter(|(row, _)| !patch.hangs_elsewhere(*row));
-        own.for_each(|(row, &vertex)| all[vertex as usize] = displacements[row]);
+    let mut all = vec![vec![[0.0; 2]; patches.vertex_count()]; marks.len()];
+    for (patch, of_marks) in patches.as_slice().iter().zip(each) {
+        let own: Vec<_> =
+            patch.vertices.iter().enumerate().filter(|(row, _)| !patch.hangs_elsewhere(*row)).collect();
+        for (all, displacements) in all.iter_mut().zip(of_marks) {
+            own.iter().for_each(|(row, vertex)| all[**vertex as usize] = displacements[*row]);
+        }
     }
     Ok(all)
 }
@@ -96,12 +102,13 @@ mod tests {
             let carrier = Carrier::new(&key);
             let signs = SpreadMessage::new(&carrier, &message, &parameters);
             let carriers = patches.carriers(message.len(), &parameters).unwrap();
-            let planned = displacements_m(&patches, &signs, carriers, &parameters).unwrap();
+            let planned = displacements_m(&patches, &[signs], carriers, &parameters).unwrap();
+            let planned = &planned[0];
             let marked = embed(&map, &key, &message, &parameters).unwrap();
             let miss = |((from, to), by): ((&[f64; 2], &[f64; 2]), &[f64; 2])| {
                 (to[0] - from[0] - by[0]).hypot(to[1] - from[1] - by[1])
             };
-            let each = town.vertices.coords().iter().zip(&marked.coords).zip(&planned).map(miss);
+            let each = town.vertices.coords().iter().zip(&marked.coords).zip(planned).map(miss);
             let missed = each.filter(|miss| *miss > most_m).count();
             assert!(missed <= marked.attenuated, "{shape:?} {missed} {}", marked.attenuated);
         }

@@ -19,6 +19,12 @@ pub trait Signs: Sync {
     fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64>;
 }
 
+impl Signs for &dyn Signs {
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        (**self).signs(patch, axis, count)
+    }
+}
+
 /// Secret signs for all coefficients: those of a patch and axis are the bits of ChaCha20 stream
 /// 2·patch + axis, least significant bit of each 64-bit word first; a 1 is +1, a 0 is −1.
 #[derive(Clone, Copy)]

@@ -157,8 +157,8 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
         of_axis(&shown, patch, axis, count).iter().zip(&turned).map(|(sign, turn)| sign * turn).collect()
     };
     let score_of_b = |forged: &dyn Signs| {
-        let moved = displacements_m(&patches, forged, COEFFICIENTS, &parameters).unwrap();
-        let observed: Vec<_> = moved.into_iter().map(Some).collect();
+        let mut moved = displacements_m(&patches, &[forged], COEFFICIENTS, &parameters).unwrap();
+        let observed: Vec<_> = moved.remove(0).into_iter().map(Some).collect();
         let seen = estimates(&map, &observed, &parameters);
         let carrier = Carrier::new(&key());
         let real = SpreadMessage::new(&carrier, &b, &parameters);

@@ -10,7 +10,7 @@ use crate::{
 use meshmark_core::{
     Result,
     agreement::{Agreement, Evidence},
-    deformation::{Deformation, Prediction},
+    deformation::{Observed, Prediction},
     estimation::Estimates,
     options::Parameters,
     signs::Sequence,
@@ -24,11 +24,10 @@ pub struct Estimated {
     pub radius: Radius,
     /// The matches of the vertices after tracking of the deformation.
     pub matches: Matches,
-    /// The estimated deformation.
-    pub deformation: Deformation,
-    /// The weight of every reference vertex: 1, or less where its displacement disagrees with the
-    /// others.
-    pub weights: Vec<f64>,
+    /// The displacements that were observed, with shaped noise, metres.
+    pub observed: Vec<Option<[f64; 2]>>,
+    /// The estimated deformation and noise besides the mark.
+    pub disturbance: Prediction,
     /// What the displacements were observed on.
     pub observations: Observations,
 }
@@ -52,12 +51,23 @@ impl Matched<'_> {
     ) -> Result<Estimated> {
         let (followed, observations) = self.observe(given, parameters, listener)?;
         let Followed { radius, matches, observed, disturbance } = followed;
-        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        listener(Progress::Stage { stage: "estimation", steps: patches.as_slice().len() as u64 });
+        let steps = self.reference.patches.as_slice().len() as u64;
+        listener(Progress::Stage { stage: "estimation", steps });
         let step = |steps| listener(Progress::Steps(steps));
-        let estimates = Estimates::new(patches, &observed, coefficients, parameters, &disturbance, &step)?;
-        let Prediction { deformation, weights, .. } = disturbance;
-        Ok(Estimated { estimates, radius, matches, deformation, weights, observations })
+        let estimates = self.estimates(&observed, &disturbance, parameters, &step)?;
+        Ok(Estimated { estimates, radius, matches, observed, disturbance, observations })
+    }
+
+    /// Estimates the signs from these observations.
+    pub(crate) fn estimates(
+        &self,
+        observed: &Observed,
+        disturbance: &Prediction,
+        parameters: &Parameters,
+        step: &(dyn Fn(usize) + Sync),
+    ) -> Result<Estimates> {
+        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
+        Estimates::new(patches, observed, coefficients, parameters, disturbance, step)
     }
 }
 

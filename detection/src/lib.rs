@@ -49,6 +49,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod coalitions;
 mod corners;
 pub mod decision;
 mod edges;

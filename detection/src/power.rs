@@ -72,7 +72,7 @@ impl Power {
         let Reference { patches, carriers, .. } = matched.reference;
         let carrier = Carrier::new(&key);
         let signs = SpreadMessage::new(&carrier, &message, parameters);
-        let trial = marked(matched, &displacements_m(patches, &signs, *carriers, parameters)?);
+        let trial = marked(matched, &displacements_m(patches, &[signs], *carriers, parameters)?[0]);
         if trial.is_chance(demodulator) {
             return Ok(Power::Trial(0.0));
         }
@@ -107,7 +107,7 @@ impl Power {
         }
         let Reference { patches, carriers, data, .. } = matched.reference;
         let signs = recipient_signs(&trial_key(matched), &PartDigest::of(&data.vertices), "trial mark");
-        let trial = marked(matched, &displacements_m(patches, &signs, *carriers, parameters)?);
+        let trial = marked(matched, &displacements_m(patches, &[signs], *carriers, parameters)?[0]);
         if trial.is_chance(Demodulator::Joint) {
             return Ok(Power::Trial(0.0));
         }

@@ -2,7 +2,7 @@
 
 use meshmark_core::{
     agreement::Evidence,
-    fingerprint::{COEFFICIENTS, FingerprintEmbedding, pilots, recipient_signs},
+    fingerprint::{COEFFICIENTS, Fingerprint, FingerprintEmbedding, pilots, recipient_signs},
     ground::Ground,
     key::SecretKey,
     map_data::{ChainKind, MapData},
@@ -95,8 +95,12 @@ fn estimated(corners: Vec<[f64; 2]>) -> Estimated {
 }
 
 fn standings(corners: Vec<[f64; 2]>) -> Vec<Standing> {
-    let evidence = Evidence::of_recipients(&estimated(corners).estimates);
-    name_recipients(&evidence, &candidates(), SIGNIFICANCE)
+    let parameters = Parameters::default();
+    let marks: Vec<_> = (0..CANDIDATES).map(|k| Fingerprint::new(&TOWN.key, &TOWN.part, &name(k))).collect();
+    with_suspect(corners, |matched| {
+        let seen = matched.estimate(&parameters, &|_| ()).unwrap();
+        matched.name_recipients(&seen, &marks, &parameters, SIGNIFICANCE).unwrap()
+    })
 }
 
 /// Every coordinate of the first `count` copies becomes what `choose` makes of them and of its
@@ -193,6 +197,21 @@ fn members_hidden_by_the_noise_of_others_are_named_after_those_are_taken_out() {
     assert_eq!(second.round, 2, "{second:?}");
     assert!(second.agreement.score < needed_score(CANDIDATES, SIGNIFICANCE), "{second:?}");
     assert!(second.score > 1.2 * second.agreement.score, "{second:?}");
+}
+
+#[test]
+fn a_mosaic_names_those_who_gave_little_once_the_vertices_of_others_are_known() {
+    // The first copy gives three vertices of five, the other seven the rest.
+    let mosaic = mixture(COPIES, |i, values| {
+        let chosen = random(i / 2 + 9000);
+        values[if chosen < 0.6 { 0 } else { 1 + ((chosen - 0.6) / 0.4 * 7.0) as usize }]
+    });
+    let evidence = Evidence::of_recipients(&estimated(mosaic.clone()).estimates);
+    let alone = name_recipients(&evidence, &candidates(), SIGNIFICANCE);
+    assert!(alone[..COPIES].iter().any(|standing| !standing.is_named), "{:?}", &alone[..COPIES]);
+    for (k, standing) in standings(mosaic).iter().enumerate() {
+        assert_eq!(standing.is_named, k < COPIES, "{k} {standing:?}");
+    }
 }
 
 #[test]

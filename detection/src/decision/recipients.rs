@@ -15,6 +15,7 @@
 
 use super::survival;
 use meshmark_core::{
+    Result,
     agreement::{Agreement, Evidence},
     signs::Sequence,
 };
@@ -58,36 +59,55 @@ pub struct Standing {
     pub is_named: bool,
 }
 
-/// Returns the standing of every candidate, in the order given.
+/// Returns the standing of every candidate in evidence alone, in the order given.
 pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significance: f64) -> Vec<Standing> {
+    let linear = |named: &[usize], _: &[usize]| {
+        Ok(evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>()))
+    };
+    name_in_rounds(evidence, candidates, significance, linear).expect("nothing fails")
+}
+
+/// Returns the standing of every candidate, in the order given. `rest` returns what remains without
+/// some, of which the second ones were named in the last round; it may depend on the suspect and on
+/// them alone.
+///
+/// # Errors
+/// Returns the errors of `rest`.
+pub fn name_in_rounds(
+    evidence: &Evidence,
+    candidates: &[Sequence],
+    significance: f64,
+    mut rest: impl FnMut(&[usize], &[usize]) -> Result<Evidence>,
+) -> Result<Vec<Standing>> {
     let tried = candidates.len();
-    let whole: Vec<Agreement> = candidates.par_iter().map(|signs| evidence.agreement(signs)).collect();
-    let standing = |agreement: &Agreement| {
+    let first = |signs: &Sequence| {
+        let agreement = evidence.agreement(signs);
         let p_value_log10 = p_value_log10(agreement.score, 1, tried);
         let is_named = p_value_log10 < significance.log10();
-        Standing { agreement: *agreement, score: agreement.score, round: 1, p_value_log10, is_named }
+        Standing { agreement, score: agreement.score, round: 1, p_value_log10, is_named }
     };
-    let mut standings: Vec<Standing> = whole.iter().map(standing).collect();
-    let mut taken_out = 0;
-    for round in 2..=MOST_ROUNDS {
-        let named: Vec<usize> = (0..tried).filter(|&k| standings[k].is_named).collect();
-        if named.len() == taken_out || named.len() == tried {
+    let mut standings: Vec<Standing> = candidates.par_iter().map(first).collect();
+    let (mut named, mut round) = (Vec::new(), 1);
+    while round < MOST_ROUNDS {
+        round += 1;
+        let new: Vec<usize> = (0..tried).filter(|k| standings[*k].is_named && !named.contains(k)).collect();
+        named.extend(&new);
+        if new.is_empty() || named.len() == tried {
             break;
         }
-        taken_out = named.len();
-        let rest = evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>());
-        standings.par_iter_mut().zip(candidates).filter(|(standing, _)| !standing.is_named).for_each(
-            |(standing, signs)| {
-                let score = rest.agreement(signs).score;
-                let p_value_log10 = p_value_log10(score, round, tried);
-                if p_value_log10 < standing.p_value_log10 {
-                    let is_named = p_value_log10 < significance.log10();
-                    *standing = Standing { score, round, p_value_log10, is_named, ..*standing };
-                }
-            },
-        );
+        let rest = rest(&named, &new)?;
+        let again = |(standing, signs): (&mut Standing, &Sequence)| {
+            let score = rest.agreement(signs).score;
+            let p_value_log10 = p_value_log10(score, round, tried);
+            if p_value_log10 < standing.p_value_log10 {
+                let is_named = p_value_log10 < significance.log10();
+                *standing = Standing { score, round, p_value_log10, is_named, ..*standing };
+            }
+        };
+        let others = standings.par_iter_mut().zip(candidates).filter(|(standing, _)| !standing.is_named);
+        others.for_each(again);
     }
-    standings
+    Ok(standings)
 }
 
 /// Returns log₁₀ of the p-value of a score in a round among so many candidates.
