@@ -20,7 +20,7 @@ use meshmark_core::{
 /// as near once in two hundred times.
 const SAME_M: f64 = 0.01;
 /// A recipient with no more than this share of the vertices gave none as they are.
-const LEAST_OWN: f64 = 0.02;
+const LEAST_OWN: f64 = 0.01;
 /// Where the noise is larger, no vertex shows whose it is, metres.
 const MOST_NOISE_M: f64 = 0.1;
 /// Named recipients that leave less than this share of the energy explain the suspect.
