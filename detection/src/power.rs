@@ -84,9 +84,7 @@ impl Power {
         )?;
         Ok(Power::Trial(trial.found.mark_score(&message)))
     }
-}
 
-impl Power {
     /// Measures the power for a fingerprint on a suspect, of which `seen` is the evidence and
     /// `pilots` are the key's.
     ///
