@@ -1,36 +1,25 @@
 //! The carrier: keyed chips that spread the message over the coefficients (paper, section 3.4).
 
-use crate::key::SecretKey;
-use rand_chacha::{
-    ChaCha20Rng,
-    rand_core::{Rng, SeedableRng},
+use crate::{
+    key::SecretKey,
+    signs::{Sequence, Signs},
 };
 
 /// Chips p_i = ±1. Every patch and axis has a sequence of its own: equal carriers could be averaged
 /// out of a map.
 pub struct Carrier {
-    seed: [u8; 32],
+    signs: Sequence,
 }
 
 impl Carrier {
     /// Creates the carrier of a key.
     pub fn new(key: &SecretKey) -> Self {
-        Carrier { seed: key.chip_seed() }
+        Carrier { signs: Sequence::new(key.chip_seed()) }
     }
 
-    /// Returns `count` chips of a patch and axis (0 = x, 1 = y): the bits of ChaCha20 stream
-    /// 2·patch + axis, least significant bit of each 64-bit word first.
+    /// Returns `count` chips of a patch and axis (0 = x, 1 = y).
     pub fn chips(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
-        let mut stream = ChaCha20Rng::from_seed(self.seed);
-        stream.set_stream((2 * patch + axis) as u64);
-        let mut word = 0;
-        let chip = |i: usize| {
-            if i.is_multiple_of(64) {
-                word = stream.next_u64();
-            }
-            if word >> (i % 64) & 1 == 1 { 1.0 } else { -1.0 }
-        };
-        (0..count).map(chip).collect()
+        self.signs.signs(patch, axis, count)
     }
 }
 

@@ -60,6 +60,16 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// Returns the disturbance of `vertices` vertices by nothing but noise of this standard
+    /// deviation.
+    pub fn of_noise(noise_m: f64, vertices: usize) -> Self {
+        Prediction {
+            deformation: Deformation::none(noise_m),
+            displacement_m: vec![[0.0; 2]; vertices],
+            weights: vec![1.0; vertices],
+        }
+    }
+
     /// Removes from `observed` the displacements that are neither deformation nor mark nor noise:
     /// those of vertices that a cut or an edit made where no reference vertex went. The scale is
     /// the median residual, which a few such vertices do not change, and at least that of the mark.

@@ -296,7 +296,7 @@ fn joint_of(job: &Job, disturbance: &Prediction) -> Result<Demodulation> {
 }
 
 /// Returns (G + I)⁻¹ h and the diagonal of (G + I)⁻¹, given the lower triangle of G.
-fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let m = gram.nrows();
     (0..m).for_each(|j| gram[(j, j)] += 1.0);
     let inverse = factor(&gram).solve(Mat::<f64>::identity(m, m));

@@ -183,7 +183,7 @@ mod tests {
         map::Map,
         map_data::{ChainKind, MapData},
         message::Message,
-        modulation::displacements_m,
+        modulation::{SpreadMessage, displacements_m},
         options::{Parameters, Rigidity},
         spectrum::Basis,
     };
@@ -291,7 +291,10 @@ mod tests {
         assert!(score(&key) > 15.0, "{}", score(&key));
         assert!(score(&SecretKey::from_bytes([5; 32])).abs() < 5.0);
         // The mean of what is planned is what is observed.
-        let planned = displacements_m(&patches, &Carrier::new(&key), &message, &parameters).unwrap();
+        let carrier = Carrier::new(&key);
+        let signs = SpreadMessage::new(&carrier, &message, &parameters);
+        let coefficients = patches.carriers(message.len(), &parameters).unwrap();
+        let planned = displacements_m(&patches, &[signs], coefficients, &parameters).unwrap().remove(0);
         let expected = houses[0].iter().map(|v| planned[*v as usize][0]).sum::<f64>() / 4.0;
         assert!((observed[0].unwrap()[0] - expected).abs() < 1e-9);
     }

@@ -3,18 +3,19 @@
 use crate::{
     Error, Result,
     carrier::Carrier,
-    deformation::{Deformation, LEAST_NOISE_M, Prediction},
+    deformation::{LEAST_NOISE_M, Prediction},
     demodulation::joint_solved,
     distortion::{AngleChange, Corner, Displacement},
     key::SecretKey,
     map::Map,
     message::Message,
-    modulation::coefficients_m,
+    modulation::SpreadMessage,
     nearness::VertexTree,
     options::{Parameters, Rigidity},
     patches::{Patch, Patches},
     placement::Placement,
     response::Response,
+    signs::Signs,
     spectrum::Basis,
     topology::{Settled, settle},
 };
@@ -37,12 +38,11 @@ pub struct Marked {
     pub attenuated: usize,
 }
 
-/// The message is read back from this many patches, which are solved again; from all patches only
-/// if that fails.
+/// A mark is read back from this many patches, which are solved again; from all patches only if
+/// that fails.
 const READ_BACK_PATCHES: usize = 16;
 
-/// The memory for the wanted displacements of a batch of messages, bytes: 16 for each vertex and
-/// message.
+/// The memory for the wanted displacements of a batch of marks, bytes: 16 for each vertex and mark.
 const MOST_BATCH_BYTES: usize = 512 << 20;
 
 /// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch. T-junctions stay, no vertex passes
@@ -59,15 +59,8 @@ pub fn embed(map: &Map, key: &SecretKey, message: &Message, parameters: &Paramet
 
 /// The part of a marking that does not depend on the message.
 pub struct Embedding<'a> {
-    map: &'a Map<'a>,
-    placement: Placement<'a>,
-    tree: VertexTree<'a>,
-    patches: Patches,
-    /// The bases of the first patches, when they are kept.
-    bases: Vec<Basis>,
+    groundwork: Groundwork<'a>,
     carrier: Carrier,
-    carriers: usize,
-    parameters: &'a Parameters,
 }
 
 impl<'a> Embedding<'a> {
@@ -82,12 +75,8 @@ impl<'a> Embedding<'a> {
         bits: usize,
         parameters: &'a Parameters,
     ) -> Result<Embedding<'a>> {
-        let placement = Placement::new(map, parameters)?;
-        let tree = VertexTree::of_all(map);
-        let patches = Patches::with_tree(map, &tree, parameters)?;
-        let carriers = patches.carriers(bits, parameters)?;
-        let (bases, carrier) = (Vec::new(), Carrier::new(key));
-        Ok(Embedding { map, placement, tree, patches, bases, carrier, carriers, parameters })
+        let groundwork = Groundwork::new(map, parameters, |patches| patches.carriers(bits, parameters))?;
+        Ok(Embedding { groundwork, carrier: Carrier::new(key) })
     }
 
     /// Prepares for many messages: it solves once for the bases of the patches from which each
@@ -95,21 +84,18 @@ impl<'a> Embedding<'a> {
     ///
     /// # Errors
     /// Fails on a patch that cannot be solved.
-    pub fn for_many(mut self) -> Result<Self> {
-        let first = self.patches.as_slice().par_iter().take(READ_BACK_PATCHES);
-        let bases = first.map(|patch| Basis::low_frequencies(patch, self.carriers + 1));
-        self.bases = bases.collect::<Result<_>>()?;
-        Ok(self)
+    pub fn for_many(self) -> Result<Self> {
+        Ok(Embedding { groundwork: self.groundwork.for_many()?, ..self })
     }
 
     /// Returns how many patches there are.
     pub fn patches(&self) -> usize {
-        self.patches.as_slice().len()
+        self.groundwork.patches.as_slice().len()
     }
 
     /// Returns how many messages, at least one, [`Self::wanted`] handles at once within its memory.
     pub fn batch(&self) -> usize {
-        (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * self.map.vertices.len())).max(1)
+        self.groundwork.batch()
     }
 
     /// Returns the displacements that are the marks, for every message those of all vertices, CRS
@@ -123,14 +109,97 @@ impl<'a> Embedding<'a> {
         messages: &[Message],
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<Vec<[f64; 2]>>> {
-        let signs: Vec<Vec<f64>> = messages.iter().map(|m| self.parameters.code.encode(m)).collect();
+        let spread = |message| SpreadMessage::new(&self.carrier, message, self.groundwork.parameters);
+        self.groundwork.wanted(&messages.iter().map(spread).collect::<Vec<_>>(), progress)
+    }
+
+    /// Marks the map with a message; `wanted` are its displacements.
+    ///
+    /// # Errors
+    /// [`Error::MessageLost`].
+    pub fn settle(&self, message: &Message, wanted: &[[f64; 2]]) -> Result<Marked> {
+        let settled = self.groundwork.settle(wanted);
+        self.check_message(message, &settled)?;
+        Ok(self.groundwork.marked(settled))
+    }
+
+    /// Reads the message back as the verifier does by default, from as many patches as it takes: by
+    /// the joint demodulator, as the noise of the grid and of the constraints is known here. The
+    /// driver reads a written file back by [`crate::demodulation::paper`], which needs no estimate
+    /// of the noise that the digits of a format add.
+    fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
+        let Groundwork { bases, parameters, .. } = &self.groundwork;
+        let (observed, disturbance) = self.groundwork.seen(settled);
+        let read = |patches: Patches| {
+            let (from, bits) = ((&patches, &bases[..]), message.len());
+            joint_solved(from, &self.carrier, &observed, bits, parameters, &disturbance)
+        };
+        if read(self.groundwork.first_patches())?.message() == *message {
+            return Ok(());
+        }
+        match read(self.groundwork.patches.clone())?.message().errors(message) {
+            0 => Ok(()),
+            errors => Err(Error::MessageLost { errors, bits: message.len() }),
+        }
+    }
+}
+
+/// The part of a marking that does not depend on what the mark carries.
+pub(crate) struct Groundwork<'a> {
+    map: &'a Map<'a>,
+    placement: Placement<'a>,
+    tree: VertexTree<'a>,
+    pub patches: Patches,
+    /// The bases of the first patches, when they are kept.
+    pub bases: Vec<Basis>,
+    /// Coefficients of a patch and axis that carry the mark.
+    pub coefficients: usize,
+    pub parameters: &'a Parameters,
+}
+
+impl<'a> Groundwork<'a> {
+    /// Meshes the map and cuts it into patches, of which `coefficients` returns how many
+    /// coefficients carry the mark.
+    pub fn new(
+        map: &'a Map<'a>,
+        parameters: &'a Parameters,
+        coefficients: impl FnOnce(&Patches) -> Result<usize>,
+    ) -> Result<Self> {
+        let placement = Placement::new(map, parameters)?;
+        let tree = VertexTree::of_all(map);
+        let patches = Patches::with_tree(map, &tree, parameters)?;
+        let coefficients = coefficients(&patches)?;
+        Ok(Groundwork { map, placement, tree, patches, bases: Vec::new(), coefficients, parameters })
+    }
+
+    /// Solves for the bases of the patches from which each mark is read back first, and keeps them.
+    pub fn for_many(mut self) -> Result<Self> {
+        let first = self.patches.as_slice().par_iter().take(READ_BACK_PATCHES);
+        let bases = first.map(|patch| Basis::low_frequencies(patch, self.coefficients + 1));
+        self.bases = bases.collect::<Result<_>>()?;
+        Ok(self)
+    }
+
+    /// Returns how many marks, at least one, [`Self::wanted`] handles at once within its memory.
+    pub fn batch(&self) -> usize {
+        (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * self.map.vertices.len())).max(1)
+    }
+
+    /// Returns the displacements that are the marks, for the signs of each those of all vertices,
+    /// CRS units. Every patch is solved once for all marks, and its basis is not kept. `progress`
+    /// is called once for every patch.
+    pub fn wanted<S: Signs>(
+        &self,
+        marks: &[S],
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<Vec<[f64; 2]>>> {
         let all = self.patches.as_slice();
         // Blocks bound the displacements that are held twice.
         let block = 64 * rayon::current_num_threads();
-        let mut wanted = vec![vec![[0.0; 2]; self.map.vertices.len()]; messages.len()];
+        let mut wanted = vec![vec![[0.0; 2]; self.map.vertices.len()]; marks.len()];
         for (first, patches) in (0..all.len()).step_by(block).zip(all.chunks(block)) {
             let of_patch = |(i, patch)| {
-                let found = self.wanted_of_patch(first + i, patch, &signs);
+                let found = self.wanted_of_patch(first + i, patch, marks);
                 progress(1);
                 found
             };
@@ -146,90 +215,71 @@ impl<'a> Embedding<'a> {
         Ok(wanted)
     }
 
-    /// Returns the displacements of the vertices of a patch for the signs b′ of every message, CRS
-    /// units.
-    fn wanted_of_patch(
+    /// Returns the displacements of the vertices of a patch for the signs of every mark, CRS units.
+    fn wanted_of_patch<S: Signs>(
         &self,
         number: usize,
         patch: &Patch,
-        signs: &[Vec<f64>],
+        marks: &[S],
     ) -> Result<Vec<Vec<[f64; 2]>>> {
-        let basis = Basis::known_or_solved(&self.bases, number, patch, self.carriers + 1)?;
+        let basis = Basis::known_or_solved(&self.bases, number, patch, self.coefficients + 1)?;
         let gain = match self.parameters.shape {
             Rigidity::Free => 1.0,
             Rigidity::Rigid => {
-                let carriers = basis.vectors.subcols(1, self.carriers);
+                let carriers = basis.vectors.subcols(1, self.coefficients);
                 Response::new(patch, carriers.to_owned()).gain(patch, carriers.to_owned())
             }
         };
-        let chips = self.chips(number);
         let in_units = |((&vertex, x), y): ((&u32, f64), f64)| {
             let scale = self.map.ground.metres_per_unit(self.map.at(vertex));
             [x / scale[0], y / scale[1]]
         };
-        let of_message = |signs: &Vec<f64>| {
-            let modulate = |chips| basis.synthesise(&self.coefficients(chips, signs, gain));
-            let [x, y] = [0, 1].map(|axis| modulate(&chips[axis]));
+        let of_mark = |mark: &S| {
+            let [x, y] = [0, 1].map(|axis| {
+                let signs = mark.signs(number, axis, self.coefficients).into_iter();
+                // Coefficient 0 is the mean.
+                let modulated = signs.map(|sign| gain * (self.parameters.amplitude_m * sign));
+                basis.synthesise(&std::iter::once(0.0).chain(modulated).collect::<Vec<_>>())
+            });
             patch.vertices.iter().zip(x).zip(y).map(in_units).collect()
         };
-        Ok(signs.iter().map(of_message).collect())
+        Ok(marks.iter().map(of_mark).collect())
     }
 
-    /// Marks the map with a message; `wanted` are its displacements.
-    ///
-    /// # Errors
-    /// [`Error::MessageLost`].
-    pub fn settle(&self, message: &Message, wanted: &[[f64; 2]]) -> Result<Marked> {
-        let Embedding { map, patches, .. } = self;
-        let settled = settle(map, &self.tree, patches.constraints(), wanted, &self.placement);
-        self.check_message(message, &settled)?;
-        Ok(Marked {
+    /// Returns the places of the vertices that are displaced as wanted, as far as the constraints
+    /// allow.
+    pub fn settle(&self, wanted: &[[f64; 2]]) -> Settled {
+        settle(self.map, &self.tree, self.patches.constraints(), wanted, &self.placement)
+    }
+
+    /// Returns the marked map.
+    pub fn marked(&self, settled: Settled) -> Marked {
+        let Groundwork { map, patches, .. } = self;
+        Marked {
             displacement: Displacement::between(map.vertices, &settled.coords, &map.measure()),
             angles: AngleChange::at(&Corner::all(map, &settled.coords)),
             coords: settled.coords,
             patches: patches.as_slice().len(),
             junctions: patches.constraints().junctions.hanging().len(),
             attenuated: settled.attenuated,
-        })
+        }
     }
 
-    fn chips(&self, patch: usize) -> [Vec<f64>; 2] {
-        [0, 1].map(|axis| self.carrier.chips(patch, axis, self.carriers))
-    }
-
-    /// Returns the coefficients of the message: 0 for the mean, then those that modulate it,
-    /// amplified by `gain`.
-    fn coefficients(&self, chips: &[f64], signs: &[f64], gain: f64) -> Vec<f64> {
-        let modulated = coefficients_m(chips, signs, self.parameters);
-        std::iter::once(0.0).chain(modulated.iter().map(|value| gain * value)).collect()
-    }
-
-    /// Reads the message back as the verifier does by default, from as many patches as it takes: by
-    /// the joint demodulator, as the noise of the grid and of the constraints is known here. The
-    /// driver reads a written file back by [`crate::demodulation::paper`], which needs no estimate
-    /// of the noise that the digits of a format add.
-    fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
+    /// Returns the displacements of the vertices, metres, and their noise, which is that of the
+    /// grid and of the constraints.
+    pub fn seen(&self, settled: &Settled) -> (Vec<Option<[f64; 2]>>, Prediction) {
         let from = self.map.vertices.coords().iter();
         let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));
         let observed: Vec<Option<[f64; 2]>> = from.zip(&settled.coords).map(moved).collect();
         let [_, metres_per_unit] = self.map.ground.metres_per_unit(self.map.vertices.centre());
         let rounding_m = self.parameters.precision_crs_units.unwrap_or(0.0) * metres_per_unit / 12f64.sqrt();
-        let disturbance = Prediction {
-            deformation: Deformation::none(rounding_m.hypot(settled.deviation_m).max(LEAST_NOISE_M)),
-            displacement_m: Vec::new(),
-            weights: vec![1.0; observed.len()],
-        };
-        let read = |count: usize| {
-            let (patches, bits) = (self.patches.head(count), message.len());
-            let from = (&patches, &self.bases[..]);
-            joint_solved(from, &self.carrier, &observed, bits, self.parameters, &disturbance)
-        };
-        if read(READ_BACK_PATCHES)?.message() == *message {
-            return Ok(());
-        }
-        match read(self.patches())?.message().errors(message) {
-            0 => Ok(()),
-            errors => Err(Error::MessageLost { errors, bits: message.len() }),
-        }
+        let noise_m = rounding_m.hypot(settled.deviation_m).max(LEAST_NOISE_M);
+        let disturbance = Prediction::of_noise(noise_m, observed.len());
+        (observed, disturbance)
+    }
+
+    /// Returns the patches from which a mark is read back first.
+    pub fn first_patches(&self) -> Patches {
+        self.patches.head(READ_BACK_PATCHES)
     }
 }

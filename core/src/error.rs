@@ -14,9 +14,11 @@ pub enum Error {
     TooFewVertices { vertices: usize, patch_size: usize, code: Code, chip_rate: usize },
     Collinear { vertices: usize },
     TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize, of: usize },
+    TooManySigns { coefficients: usize, vertices: usize, of: usize },
     CodeLength { bits: usize },
     PrecisionTooCoarse { precision: f64, metres: f64, tolerance_m: f64 },
     MessageLost { errors: usize, bits: usize },
+    FingerprintLost { score: f64, least: f64 },
     NoConvergence { vertices: usize },
     Message(String),
     Key(KeyFault),
@@ -81,6 +83,10 @@ pub enum RecordFault {
     Version { found: u32, expected: u32 },
     Value(Box<Error>),
     WhitenedRecipient,
+    Coefficients { found: usize, most: usize },
+    Digest { text: String },
+    NoPart,
+    NoRecipient,
 }
 
 impl fmt::Display for RecordFault {
@@ -95,6 +101,12 @@ impl fmt::Display for RecordFault {
             RecordFault::WhitenedRecipient => {
                 f.write_str("it has a recipient and a whitened message, of which only one can be")
             }
+            RecordFault::Coefficients { found, most } => write!(f, "{found} coefficients, of 1 to {most}"),
+            RecordFault::Digest { text } => {
+                write!(f, "\"{text}\" is no digest: it has 64 hexadecimal digits")
+            }
+            RecordFault::NoPart => f.write_str("it names no part of the map"),
+            RecordFault::NoRecipient => f.write_str("it has no recipient"),
         }
     }
 }
@@ -123,6 +135,16 @@ impl Error {
             Error::TooManyCoefficients { code, bits, chip_rate, vertices, of } => {
                 too_many(*code, *bits, *chip_rate, (*vertices, *of), spelling)
             }
+            Error::TooManySigns { coefficients, vertices, of } => format!(
+                "a recipient needs {coefficients} coefficients in every patch, but the smallest patch ({vertices} vertices) \
+                 has {}: use {}",
+                vertices - 1,
+                match of > coefficients {
+                    true => format!("a larger {}", name("PATCH_SIZE")),
+                    false =>
+                        format!("a map of more than {coefficients} vertices, or mark more layers together"),
+                }
+            ),
             Error::CodeLength { bits } => format!(
                 "{} carries a message of exactly 128 bits, not {bits}: use 32 hexadecimal digits, a {}, or {}",
                 spelling.value("CODE", "LDPC"),
@@ -142,6 +164,13 @@ impl Error {
                 name("AMPLITUDE"),
                 name("CHIP_RATE"),
                 name("PATCH_SIZE"),
+                name("PRECISION"),
+                name("TOLERANCE")
+            ),
+            Error::FingerprintLost { score, least } => format!(
+                "after marking, the signs of the recipient agree by {score:.1} standard deviations, and {least} are \
+                 needed: raise {}, use a finer {} or a larger {}, or mark more layers together",
+                name("AMPLITUDE"),
                 name("PRECISION"),
                 name("TOLERANCE")
             ),

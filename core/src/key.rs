@@ -2,7 +2,7 @@
 
 pub use crate::options::RECIPIENT_BITS;
 
-use crate::{Error, Result, error::KeyFault, hex, message::Message};
+use crate::{Error, Result, error::KeyFault, hex, message::Message, part::PartDigest};
 use hmac::{Hmac, KeyInit, Mac};
 use serde::{Deserialize, Serialize};
 use sha2::Sha256;
@@ -30,6 +30,15 @@ pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
             Err(io::Error::other(format!("it is longer than the {LONGEST_TEXT} bytes of any key or record")))
         }
     }
+}
+
+/// The versions of the mark, whose secrets are independent of each other.
+#[derive(Clone, Copy)]
+enum MarkVersion {
+    /// A message.
+    One,
+    /// A fingerprint.
+    Two,
 }
 
 /// A 256-bit secret. `Debug` does not show it, and it is wiped from memory when dropped.
@@ -109,11 +118,36 @@ impl SecretKey {
         self.derive("chips", b"")
     }
 
-    /// Returns the HMAC-SHA-256 (FIPS 198-1) of a purpose and a text, so that one use of the key
-    /// reveals nothing about another.
+    /// Returns 256 bits of a keyed hash, in hexadecimal, that commit to the key: nobody can find
+    /// another key with the same ones.
+    pub fn commitment(&self) -> String {
+        hex::encode(&self.derive_for(MarkVersion::Two, "key commitment", b""))
+    }
+
+    /// Returns the seed of the signs that all copies of a part have in common.
+    pub(crate) fn pilot_seed(&self, part: &PartDigest) -> [u8; 32] {
+        self.derive_for(MarkVersion::Two, "pilots", part.as_bytes())
+    }
+
+    /// Returns the seed of the signs of a recipient on a part.
+    pub(crate) fn recipient_seed(&self, part: &PartDigest, recipient: &str) -> [u8; 32] {
+        // The digest has a fixed length, so that part and recipient cannot run into each other.
+        let text = [part.as_bytes(), recipient.as_bytes()].concat();
+        self.derive_for(MarkVersion::Two, "fingerprint", &text)
+    }
+
     fn derive(&self, purpose: &str, text: &[u8]) -> [u8; 32] {
+        self.derive_for(MarkVersion::One, purpose, text)
+    }
+
+    /// Returns the HMAC-SHA-256 (FIPS 198-1) of a version of the mark, a purpose and a text, so
+    /// that one use of the key reveals nothing about another.
+    fn derive_for(&self, version: MarkVersion, purpose: &str, text: &[u8]) -> [u8; 32] {
         let mut mac = Hmac::<Sha256>::new_from_slice(&self.0).expect("HMAC takes any key length");
-        mac.update(b"meshmark v1 ");
+        mac.update(match version {
+            MarkVersion::One => b"meshmark v1 ",
+            MarkVersion::Two => b"meshmark v2 ",
+        });
         mac.update(purpose.as_bytes());
         mac.update(&[0]);
         mac.update(text);
@@ -172,5 +206,13 @@ mod tests {
         assert_ne!(a.recipient_message("ACME"), a.recipient_message("ACME "));
         assert_ne!(a.recipient_message("ACME"), b.recipient_message("ACME"));
         assert_ne!(a.id(), b.id());
+    }
+
+    #[test]
+    fn a_commitment_has_256_bits_of_its_own() {
+        let [a, b] = [1, 2].map(|byte| SecretKey::from_bytes([byte; 32]));
+        assert_eq!(a.commitment().len(), 64);
+        assert_ne!(a.commitment(), b.commitment());
+        assert!(!a.commitment().starts_with(&a.id()));
     }
 }

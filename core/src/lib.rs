@@ -36,6 +36,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod agreement;
 pub mod areas;
 pub mod bodies;
 pub mod carrier;
@@ -49,6 +50,9 @@ pub mod disjoint_sets;
 pub mod distortion;
 pub mod embedding;
 mod error;
+pub mod estimation;
+pub mod fingerprint;
+pub mod fingerprint_record;
 pub mod ground;
 pub mod hex;
 pub mod junctions;
@@ -63,12 +67,14 @@ mod nearness;
 pub mod noise_law;
 pub mod options;
 pub mod orientation;
+pub mod part;
 pub mod patches;
 mod placement;
 pub mod record;
 mod response;
 pub mod scale;
 mod sides;
+pub mod signs;
 pub mod spectrum;
 mod topology;
 mod tridiagonal;

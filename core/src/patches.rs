@@ -162,12 +162,32 @@ impl Patches {
     pub fn carriers(&self, bits: usize, parameters: &Parameters) -> Result<usize> {
         let Parameters { code, chip_rate, .. } = *parameters;
         let carriers = code.channel_bits(bits)? * chip_rate;
-        let smallest = self.patches.iter().map(|p| p.vertices.len()).min().unwrap_or(0);
+        let smallest = self.smallest();
         if carriers >= smallest {
             let of = self.positions_m.len();
             return Err(Error::TooManyCoefficients { code, bits, chip_rate, vertices: smallest, of });
         }
         Ok(carriers)
+    }
+
+    /// Checks that so many coefficients of an axis fit into the smallest patch besides the mean,
+    /// and returns them.
+    ///
+    /// # Errors
+    /// [`Error::TooManySigns`].
+    pub fn check_room(&self, coefficients: usize) -> Result<usize> {
+        match self.smallest() {
+            smallest if coefficients >= smallest => {
+                let of = self.positions_m.len();
+                Err(Error::TooManySigns { coefficients, vertices: smallest, of })
+            }
+            _ => Ok(coefficients),
+        }
+    }
+
+    /// Returns the number of vertices of the smallest patch.
+    fn smallest(&self) -> usize {
+        self.patches.iter().map(|p| p.vertices.len()).min().unwrap_or(0)
     }
 
     /// Checks the invariants: every vertex in one patch, ascending, edges sorted, patches

@@ -98,12 +98,17 @@ impl VertexTable {
     /// Returns the SHA-256 of the canonical vertices (x then y, 64-bit IEEE, little endian) in
     /// hexadecimal, which binds a record to its reference map.
     pub fn digest(&self) -> String {
+        hex::encode(&self.sha256())
+    }
+
+    /// Returns the bytes of [`Self::digest`].
+    pub fn sha256(&self) -> [u8; 32] {
         let mut hash = Sha256::new();
         for [x, y] in &self.coords {
             hash.update(x.to_le_bytes());
             hash.update(y.to_le_bytes());
         }
-        hex::encode(&hash.finalize())
+        hash.finalize().into()
     }
 }
 

@@ -12,10 +12,12 @@ use gdal::{
 };
 use meshmark_core::{
     embedding::Marked,
+    fingerprint_record::{self, CopyEntry, FingerprintRecord, FingerprintShape, PartEntry, ReferenceEntry},
     key::SecretKey,
     map::Map,
     message::{ADVISED_BITS, LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Spelling, Subject},
+    part::PartDigest,
     record::{self, Distortion, Record, Reference, TopologyEntry},
     scale::Measure,
     vertices::VertexTable,
@@ -61,6 +63,9 @@ pub enum NotMoved {
     #[error(transparent)]
     Wkb(#[from] wkb::WkbError),
 }
+
+/// The program and its version, for records.
+const SOFTWARE: &str = concat!("meshmark ", env!("CARGO_PKG_VERSION"));
 
 /// A map smaller than this many tolerances would be noise after its marking.
 const LEAST_TOLERANCES: f64 = 10.0;
@@ -253,7 +258,7 @@ pub fn record(
     let Distortion { displacement, angles, areas, hausdorff, validity, overlaps, topology } = distortion;
     Record {
         meshmark_record: record::VERSION,
-        software: concat!("meshmark ", env!("CARGO_PKG_VERSION")).into(),
+        software: SOFTWARE.into(),
         key_id: key.id(),
         recipient: subject.recipient().map(String::from),
         message: subject.message(key).to_hex(),
@@ -269,5 +274,32 @@ pub fn record(
         validity,
         overlaps,
         topology,
+    }
+}
+
+/// Returns the record of a marking for a recipient with a fingerprint of `coefficients`
+/// coefficients. The map is one part; the digests of its files are not known here.
+pub fn fingerprint_record(
+    options: &Options,
+    recipient: &str,
+    key: &SecretKey,
+    coefficients: usize,
+    reference: Reference,
+    distortion: Distortion,
+) -> FingerprintRecord {
+    let Reference { vertices, patches, vertices_sha256, crs } = reference;
+    let sha256 = PartDigest::try_from(vertices_sha256.clone()).expect("it is the digest of the vertices");
+    FingerprintRecord {
+        meshmark_record: fingerprint_record::VERSION,
+        software: SOFTWARE.into(),
+        key_commitment: key.commitment(),
+        recipient: recipient.into(),
+        mark: FingerprintShape::new(coefficients, &options.parameters),
+        layers: options.layers.clone(),
+        srs: options.srs.clone(),
+        reference: ReferenceEntry { vertices, vertices_sha256, file_sha256: None, crs },
+        copy: CopyEntry { file_sha256: None },
+        parts: vec![PartEntry { sha256, vertices, patches }],
+        distortion,
     }
 }

@@ -85,11 +85,7 @@ impl Matched<'_> {
             let matches = (self.radius, self.matches.clone());
             return Ok(self.demodulated(found, matches, None, weights, Observations::Vertices));
         }
-        listener(Progress::Stage { stage: "deformation", steps: 0 });
-        let carriers = self.reference.carriers;
-        let followed = Tracking::new(self).follow(carriers, parameters)?;
-        let chosen = observations::choose(self, followed, carriers, parameters, given)?;
-        let Chosen { derived, followed, observations } = chosen;
+        let Chosen { derived, followed, observations } = self.observe(given, parameters, listener)?;
         let Followed { radius, matches, observed, disturbance } = followed;
         listener(Progress::Stage { stage, steps });
         let of = derived.as_ref().map_or(Observables::Vertices(patches), Observables::Derived);
@@ -98,6 +94,20 @@ impl Matched<'_> {
         // Points of features have no weight of a vertex.
         let weights = if derived.is_some() { vec![1.0; patches.vertex_count()] } else { weights };
         Ok(self.demodulated(found, (radius, matches), Some(deformation), weights, observations))
+    }
+
+    /// Follows the deformation of the suspect on `given` observations, or on those with more
+    /// information.
+    pub(crate) fn observe(
+        &self,
+        given: Option<Observations>,
+        parameters: &Parameters,
+        listener: Listener,
+    ) -> Result<Chosen<'_>> {
+        listener(Progress::Stage { stage: "deformation", steps: 0 });
+        let carriers = self.reference.carriers;
+        let followed = Tracking::new(self).follow(carriers, parameters)?;
+        observations::choose(self, followed, carriers, parameters, given)
     }
 
     fn demodulated(

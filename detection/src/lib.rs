@@ -49,9 +49,11 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod coalitions;
 mod corners;
 pub mod decision;
 mod edges;
+mod estimated;
 mod examination;
 mod features;
 mod groups;
@@ -67,6 +69,7 @@ mod progress;
 pub mod registration;
 mod tracking;
 
+pub use estimated::Estimated;
 pub use examination::{Demodulated, Demodulator, Mark};
 pub use features::maps_of_features;
 pub use histogram::{Histogram, round_up};

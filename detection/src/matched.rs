@@ -36,6 +36,22 @@ impl<'a> Reference<'a> {
         let carriers = patches.carriers(bits, parameters)?;
         Ok(Reference { data, ground: map.ground, patches, carriers })
     }
+
+    /// Meshes a map and cuts it into patches, as [`Self::new`] does, for fingerprints of
+    /// `coefficients` coefficients of every patch and axis.
+    ///
+    /// # Errors
+    /// Fails when such a fingerprint does not fit the map.
+    pub fn for_fingerprints(
+        data: &'a MapData,
+        map: &Map,
+        coefficients: usize,
+        parameters: &Parameters,
+    ) -> Result<Self> {
+        let patches = Patches::new(map, parameters)?;
+        let carriers = patches.check_room(coefficients)?;
+        Ok(Reference { data, ground: map.ground, patches, carriers })
+    }
 }
 
 /// A suspect whose vertices are matched with those of its reference.

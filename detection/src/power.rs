@@ -8,7 +8,8 @@
 //! and neither the tested key nor a message.
 
 use crate::{
-    decision::{p_any_message_log10, shows_key},
+    decision::{p_any_message_log10, recipients, shows_key},
+    estimated::Estimated,
     examination::{Demodulated, Demodulator, Mark},
     features,
     linework::{Edge, Plane, is_alone},
@@ -17,8 +18,18 @@ use crate::{
     progress::Listener,
 };
 use meshmark_core::{
-    Result, carrier::Carrier, ground::Ground, key::SecretKey, map_data::MapData, message::Message,
-    modulation::displacements_m,
+    Result,
+    agreement::Evidence,
+    carrier::Carrier,
+    fingerprint::recipient_signs,
+    ground::Ground,
+    key::SecretKey,
+    map_data::MapData,
+    message::Message,
+    modulation::{SpreadMessage, displacements_m},
+    options::Parameters,
+    part::PartDigest,
+    signs::Sequence,
 };
 use rayon::prelude::*;
 use rstar::RTree;
@@ -60,11 +71,11 @@ impl Power {
         let key = trial_key(matched);
         let message = Message::from_signs(&vec![1.0; mark.bits]);
         let parameters = mark.parameters;
-        let displacement_m =
-            displacements_m(&matched.reference.patches, &Carrier::new(&key), &message, parameters)?;
-        let moved = moved(matched, seen.observations, &displacement_m);
-        let suspect = (matched.suspect, &matched.registration);
-        let trial = Matched::of_moved(matched.reference, suspect, moved, |_, _, _| matched.radius);
+        let Reference { patches, carriers, .. } = matched.reference;
+        let carrier = Carrier::new(&key);
+        let signs = SpreadMessage::new(&carrier, &message, parameters);
+        let displacement_m = displacements_m(patches, &[signs], *carriers, parameters)?;
+        let trial = marked(matched, seen.observations, &displacement_m[0]);
         if trial.is_chance(demodulator) {
             return Ok(Power::Trial(0.0));
         }
@@ -76,6 +87,42 @@ impl Power {
         )?;
         Ok(Power::Trial(trial.found.mark_score(&message)))
     }
+
+    /// Measures the power for a fingerprint on a suspect, of which `seen` is the evidence and
+    /// `pilots` are the key's.
+    ///
+    /// # Errors
+    /// Returns the errors of the estimation.
+    pub fn of_fingerprint(
+        matched: &Matched,
+        seen: &Estimated,
+        pilots: &Sequence,
+        parameters: &Parameters,
+        listener: Listener,
+    ) -> Result<Self> {
+        if seen.estimates.values.iter().all(|value| *value == 0.0) {
+            return Ok(Power::Unmoved);
+        }
+        if recipients::shows_key(seen.key_agreement(pilots).score) {
+            return Ok(Power::KeyShows);
+        }
+        let Reference { patches, carriers, data, .. } = matched.reference;
+        let signs = recipient_signs(&trial_key(matched), &PartDigest::of(&data.vertices), "trial mark");
+        let displacement_m = displacements_m(patches, &[signs], *carriers, parameters)?;
+        let trial = marked(matched, seen.observations, &displacement_m[0]);
+        if trial.is_chance(Demodulator::Joint) {
+            return Ok(Power::Trial(0.0));
+        }
+        let trial = trial.estimate_on(Some(seen.observations), parameters, listener)?;
+        Ok(Power::Trial(Evidence::of_recipients(&trial.estimates).agreement(&signs).score))
+    }
+}
+
+/// Returns the suspect as if it had been made from a map with this mark, metres at every vertex.
+fn marked<'a>(matched: &Matched<'a>, observed_on: Observations, displacement_m: &[[f64; 2]]) -> Matched<'a> {
+    let moved = moved(matched, observed_on, displacement_m);
+    let suspect = (matched.suspect, &matched.registration);
+    Matched::of_moved(matched.reference, suspect, moved, |_, _, _| matched.radius)
 }
 
 /// Returns a key that follows from the two maps, so that equal maps give equal power, and nobody

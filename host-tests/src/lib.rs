@@ -7,13 +7,15 @@
 //!   and the C compiler
 //! - [`attacks`]: from a map to a map; [`tiling`]: larger maps
 //! - [`experiment`]: maps are marked, copies attacked, suspects verified
-//! - [`faults`]: killed writers and full disks; [`vectors`]: the test vectors
+//! - [`faults`]: killed writers and full disks; [`vectors`], [`fingerprint_vectors`]: the test
+//!   vectors of the two versions of the mark
 
 pub mod attacks;
 mod built;
 pub mod contents;
 pub mod experiment;
 pub mod faults;
+pub mod fingerprint_vectors;
 pub mod plugin;
 pub mod process;
 pub mod product;

@@ -49,9 +49,9 @@ pub fn key() -> SecretKey {
 ///
 /// # Panics
 /// Panics when it cannot be read.
-fn read(path: &Path) -> Survey {
+pub(crate) fn read(path: &Path, selection: &Selection) -> Survey {
     let dataset = Dataset::open(path).expect("a map GDAL opens");
-    survey(&dataset, &Selection::default()).expect("a map of one CRS")
+    survey(&dataset, selection).expect("a map of one CRS")
 }
 
 /// Returns every coordinate of a map, feature by feature.
@@ -95,7 +95,7 @@ impl ReferenceMarking {
     /// # Panics
     /// Panics when it cannot be marked.
     pub fn new() -> Self {
-        let map = read(&reference_path());
+        let map = read(&reference_path(), &Selection::default());
         let on_ground = map.map().expect("a projected CRS");
         let ground = on_ground.ground;
         let code = Code::Repetition;
@@ -245,7 +245,7 @@ fn ring() -> Value {
     })
 }
 
-fn plus_minus(chips: &[f64]) -> String {
+pub(crate) fn plus_minus(chips: &[f64]) -> String {
     chips.iter().map(|chip| if *chip > 0.0 { '+' } else { '-' }).collect()
 }
 

@@ -1,7 +1,10 @@
 //! The current code reproduces the test vectors of fixtures/vectors.
 
-use meshmark_core::{key::SecretKey, record::Record};
-use meshmark_host_tests::vectors::{self, ReferenceMarking, differences};
+use meshmark_core::{fingerprint_record::FingerprintRecord, key::SecretKey, record::Record};
+use meshmark_host_tests::{
+    fingerprint_vectors,
+    vectors::{self, ReferenceMarking, differences},
+};
 use serde_json::{Value, json};
 use std::{fs, sync::LazyLock};
 
@@ -20,6 +23,22 @@ fn every_intermediate_value_is_as_written() {
     let written: Value = serde_json::from_str(&text("steps.json")).unwrap();
     let found = differences(&MARKING.steps(), &written, TOLERANCE);
     assert!(found.is_empty(), "{} differences: {:#?}", found.len(), &found[..found.len().min(20)]);
+}
+
+#[test]
+fn every_value_of_a_fingerprint_and_of_its_record_is_as_written() {
+    let (steps, record) = fingerprint_vectors::steps_and_record();
+    let written: Value = serde_json::from_str(&text("fingerprint/steps.json")).unwrap();
+    let found = differences(&steps, &written, TOLERANCE);
+    assert!(found.is_empty(), "{} differences: {found:#?}", found.len());
+    let agreement = &written["5_agreement"];
+    assert_eq!(agreement["recipient"]["agreeing"], agreement["recipient"]["signs"]);
+    assert!(agreement["other_recipient"]["score"].as_f64().unwrap().abs() < 5.0);
+    let read = FingerprintRecord::from_json(&text("fingerprint/record.json")).unwrap();
+    assert!(read.is_of(&vectors::key()));
+    let [now, written] = [&record, &read].map(|record| serde_json::to_value(record).unwrap());
+    let found = differences(&now, &written, TOLERANCE);
+    assert!(found.is_empty(), "{found:#?}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use meshmark_core::{
     code::Code,
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
+    fingerprint_record::FingerprintRecord,
     options::{Kind, OPTIONS, Parameters},
     record::{Record, Reference, TopologyEntry},
 };
@@ -116,6 +117,41 @@ fn records_are_valid_with_every_field_given_and_with_none() {
 fn the_record_that_the_driver_wrote_is_valid() {
     let text = fs::read_to_string(root().join("fixtures/vectors/record.json")).unwrap();
     assert_valid("record", &serde_json::from_str(&text).unwrap());
+}
+
+#[test]
+fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
+    let text = fs::read_to_string(root().join("fixtures/vectors/fingerprint/record.json")).unwrap();
+    let record: Value = serde_json::from_str(&text).unwrap();
+    assert_valid("record-2", &record);
+    let objects = ["/mark", "/reference", "/copy", "/parts/0", "/distortion", "/distortion/angles"];
+    assert_closed("record-2", &record, &objects);
+    for field in record.as_object().unwrap().keys() {
+        assert!(!errors("record-2", &without(&record, "", field)).is_empty(), "{field} may be missing");
+    }
+    let mut signed = record.clone();
+    signed["signature"] = json!({ "ed25519": "00" });
+    assert_valid("record-2", &signed);
+    assert!(FingerprintRecord::from_json(&signed.to_string()).is_ok());
+    let changes = [
+        ("/meshmark_record", json!(1)),
+        ("/recipient", json!(" ")),
+        ("/key_commitment", json!("434471506306423b")),
+        ("/mark/amplitude_m", json!(0)),
+        ("/mark/coefficients", json!(4096)),
+        ("/mark/patch_size", json!(15)),
+        ("/mark/shape", json!("round")),
+        ("/layers", json!([])),
+        ("/reference/vertices_sha256", json!("00")),
+        ("/copy/file_sha256", json!("00")),
+        ("/parts", json!([])),
+        ("/parts/0/sha256", json!("00")),
+    ];
+    assert_refused("record-2", &record, &changes);
+    for (pointer, value) in changes {
+        let changed = with(&record, pointer, value.clone()).to_string();
+        assert!(FingerprintRecord::from_json(&changed).is_err(), "{pointer} = {value} is read");
+    }
 }
 
 /// What `--report` writes, run in the fixtures.

@@ -10,18 +10,18 @@ use crate::power::Power;
 use meshmark_core::demodulation::Demodulation;
 
 /// The verdict is "no match" only where a present mark would be missed with a smaller probability.
-const MOST_MISSED_LOG10: f64 = -3.0;
+pub(super) const MOST_MISSED_LOG10: f64 = -3.0;
 /// A smaller p-value is never "no match".
-const SUSPICIOUS_LOG10: f64 = -2.0;
+pub(super) const SUSPICIOUS_LOG10: f64 = -2.0;
 /// No smaller probability of missing a mark is stated: the studies support no more.
-const LEAST_MISSED_LOG10: f64 = -6.0;
+pub(super) const LEAST_MISSED_LOG10: f64 = -6.0;
 /// Standard deviation of the score of a mark around that of one trial mark on the same suspect:
 /// each varies by up to 1.3 where noise differs from place to place, so that the variance of their
 /// difference is 2 · 1.3².
-const TRIAL_DEVIATION: f64 = 1.84;
+pub(super) const TRIAL_DEVIATION: f64 = 1.84;
 /// The bits of a copy of one recipient have this share of the energy of a message, or more; those
 /// of an average or a patchwork of copies have less.
-const LEAST_FULLNESS: f64 = 0.85;
+pub(super) const LEAST_FULLNESS: f64 = 0.85;
 /// Least standard deviation of the agreement of a recipient's bits.
 const LEAST_DEVIATION: f64 = 0.1;
 

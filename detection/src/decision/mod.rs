@@ -16,6 +16,8 @@
 mod absence;
 mod any_message;
 mod decoys;
+pub mod fingerprints;
+pub mod recipients;
 mod rivals;
 mod survival;
 mod verdict;

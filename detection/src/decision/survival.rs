@@ -19,6 +19,20 @@ pub fn normal_log10(score: f64) -> f64 {
     ln / LN_10
 }
 
+/// Returns log₁₀ of a bound of the probability that a weighted sum of independent random signs of
+/// variance 1 exceeds `score`, whatever the weights are: c Φ(−score) with c = 1 / (4 Φ(−√2)), the
+/// smallest factor for which that is true (V. Bentkus, D. Dzindzalieta, *A tight Gaussian bound for
+/// weighted sums of Rademacher random variables*, Bernoulli 21, 2015).
+pub fn signs_log10(score: f64) -> f64 {
+    let factor_log10 = -4f64.log10() - normal_log10(SQRT_2);
+    (factor_log10 + normal_log10(score)).min(0.0)
+}
+
+/// Returns the score from which [`signs_log10`] is at most log₁₀ of `p`, for p from 10⁻³⁰⁰ to 1.
+pub fn signs_quantile(p: f64) -> f64 {
+    normal_quantile(4.0 * p * 10f64.powf(normal_log10(SQRT_2)))
+}
+
 /// Returns the score that a standard normal variable exceeds with probability `p`, for p from
 /// 10⁻³⁰⁰ to ½.
 pub fn normal_quantile(p: f64) -> f64 {
@@ -78,6 +92,32 @@ mod tests {
         // The function is continuous where the formula changes, and finite in the far tail.
         assert!((normal_log10(29.999_999_9) - normal_log10(30.0)).abs() < 1e-4);
         assert!((normal_log10(100.0) + 2173.87).abs() < 0.01, "{}", normal_log10(100.0));
+    }
+
+    #[test]
+    fn sums_of_signs_stay_below_their_bound_and_reach_it_once() {
+        // All 2¹² sums of equal and of unequal weights.
+        let equal = vec![1.0; 12];
+        let unequal: Vec<f64> = (0..12).map(|i| f64::powi(0.7, i)).collect();
+        let two = [vec![1.0; 2], vec![0.0; 10]].concat();
+        for weights in [&equal, &unequal, &two] {
+            let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+            let sum = |signs: u32| {
+                let each = weights.iter().enumerate();
+                each.map(|(i, w)| if signs >> i & 1 == 1 { *w } else { -w }).sum::<f64>() / norm
+            };
+            let sums: Vec<f64> = (0..1 << 12).map(sum).collect();
+            for score in [0.0, 0.5, 1.0, SQRT_2, 2.0, 2.5, 3.0, 3.4] {
+                let beyond = sums.iter().filter(|sum| **sum >= score - 1e-12).count() as f64 / 4096.0;
+                assert!(beyond.log10() <= signs_log10(score) + 1e-9, "{weights:?} {score} {beyond}");
+            }
+        }
+        // Two equal signs agree with probability ¼, at √2 deviations.
+        assert!((signs_log10(SQRT_2) - 0.25f64.log10()).abs() < 1e-12);
+        assert_eq!(signs_log10(-3.0), 0.0);
+        for score in [1.0, 4.75, 12.0] {
+            assert!((signs_quantile(10f64.powf(signs_log10(score))) - score).abs() < 1e-6, "{score}");
+        }
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! Writes fixtures/vectors anew: key, record, marked map and the intermediate values.
+//! Writes fixtures/vectors anew: key, record, marked map and the intermediate values of both
+//! versions of the mark.
 //!
 //! The marked map and the record come from the driver, through ogr2ogr, as a user makes them; build
 //! it first (`make build`).
 
 use meshmark_host_tests::{
-    Result,
+    Result, fingerprint_vectors,
     product::{Product, marking_arguments},
     vectors::{self, RECIPIENT, ReferenceMarking},
 };
@@ -22,7 +23,11 @@ fn main() -> Result<()> {
     fs::write(folder.join("key.json"), vectors::key().to_json().as_bytes())?;
     mark(&folder)?;
     let steps = vectors::to_text(&ReferenceMarking::new().steps());
-    Ok(fs::write(folder.join("steps.json"), steps)?)
+    fs::write(folder.join("steps.json"), steps)?;
+    let (folder, (steps, record)) = (fingerprint_vectors::folder(), fingerprint_vectors::steps_and_record());
+    fs::create_dir_all(&folder)?;
+    fs::write(folder.join("steps.json"), vectors::to_text(&steps))?;
+    Ok(fs::write(folder.join("record.json"), record.to_json())?)
 }
 
 /// Runs `ogr2ogr` through the driver, with a fixed date so that the same map has the same bytes.

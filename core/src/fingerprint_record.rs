@@ -1,0 +1,273 @@
+//! The record of a marking for a recipient, version 2: a fingerprint instead of a message.
+//!
+//! It names key, vertices and files by digests of 256 bits, so that nothing can be exchanged for
+//! something else that fits. A later version may add fields, for example a signature: fields
+//! that are unknown here are skipped, but not among those that shape the mark.
+
+use crate::{
+    Error, Result,
+    error::RecordFault,
+    key::SecretKey,
+    options::{Laplacian, Options, PATCH_SIZE_RANGE, Parameters, Rigidity},
+    part::PartDigest,
+    record::Distortion,
+};
+use serde::{Deserialize, Serialize};
+
+/// The version of this record.
+pub const VERSION: u32 = 2;
+
+/// A record of a fingerprint. It holds neither the secret nor the time, so that equal input makes an
+/// equal record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FingerprintRecord {
+    /// Version of this format.
+    pub meshmark_record: u32,
+    /// Version of the program that marked.
+    pub software: String,
+    /// Commitment to the key, see [`SecretKey::commitment`].
+    pub key_commitment: String,
+    /// The recipient.
+    pub recipient: String,
+    /// The numbers that shaped the mark.
+    pub mark: FingerprintShape,
+    /// Layers that were marked; all when null.
+    pub layers: Option<Vec<String>>,
+    /// CRS given for a source that had none.
+    pub srs: Option<String>,
+    /// The reference map.
+    pub reference: ReferenceEntry,
+    /// The copy that was handed out.
+    pub copy: CopyEntry,
+    /// The parts of the map, each with signs of its own.
+    pub parts: Vec<PartEntry>,
+    /// What marking did to the map.
+    pub distortion: Distortion,
+}
+
+/// The numbers that shape a fingerprint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FingerprintShape {
+    /// α, amplitude per coefficient, metres on the ground.
+    pub amplitude_m: f64,
+    /// Coefficients of a patch and axis that carry the mark.
+    pub coefficients: usize,
+    /// The smallest number of vertices in a patch.
+    pub patch_size: usize,
+    /// No vertex moves further than this, metres on the ground.
+    pub tolerance_m: f64,
+    /// Which vertices move as one.
+    pub shape: Rigidity,
+    /// Which functions carry the mark.
+    pub basis: Laplacian,
+    /// Grid of the marked coordinates, CRS units; null where it is not rounded.
+    pub precision_crs_units: Option<f64>,
+}
+
+/// The reference map, as a record describes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceEntry {
+    /// Distinct vertices of the marked layers.
+    pub vertices: usize,
+    /// Digest of the vertices, see [`crate::vertices::VertexTable::digest`].
+    pub vertices_sha256: String,
+    /// Digest of its file; null where it is not one file, or was never written as one.
+    pub file_sha256: Option<String>,
+    /// CRS as authority and code, or as WKT; null when unknown.
+    pub crs: Option<String>,
+}
+
+/// The copy that was handed out, as far as whoever marked it saw it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CopyEntry {
+    /// Digest of its file; null where another program writes it.
+    pub file_sha256: Option<String>,
+}
+
+/// A part of the map, as a record describes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartEntry {
+    /// Digest of its vertices, from which its signs follow.
+    pub sha256: PartDigest,
+    /// Its distinct vertices.
+    pub vertices: usize,
+    /// Its patches.
+    pub patches: usize,
+}
+
+impl FingerprintShape {
+    /// Returns the shape of a fingerprint with these parameters; those of a message are not part of
+    /// it.
+    pub fn new(coefficients: usize, parameters: &Parameters) -> Self {
+        let Parameters { amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, .. } =
+            *parameters;
+        FingerprintShape {
+            amplitude_m,
+            coefficients,
+            patch_size,
+            tolerance_m,
+            shape,
+            basis,
+            precision_crs_units,
+        }
+    }
+
+    /// Returns the parameters of the mark; those of a message have their defaults.
+    pub fn parameters(&self) -> Parameters {
+        let FingerprintShape {
+            amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, ..
+        } = *self;
+        let of_message = Parameters::default();
+        Parameters { amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, ..of_message }
+    }
+}
+
+impl FingerprintRecord {
+    /// Reads a record's text and checks that its values are legal.
+    ///
+    /// # Errors
+    /// [`Error::Record`] describes the fault.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let record: FingerprintRecord =
+            serde_json::from_str(text).map_err(|error| Error::Record(RecordFault::Json(error)))?;
+        record.check()?;
+        Ok(record)
+    }
+
+    /// Returns the text of the record.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("a record is JSON") + "\n"
+    }
+
+    /// Returns whether the record was made with this key.
+    pub fn is_of(&self, key: &SecretKey) -> bool {
+        self.key_commitment == key.commitment()
+    }
+
+    fn check(&self) -> Result<()> {
+        let fault = |fault| Err(Error::Record(fault));
+        if self.meshmark_record != VERSION {
+            return fault(RecordFault::Version { found: self.meshmark_record, expected: VERSION });
+        }
+        let most = PATCH_SIZE_RANGE.1;
+        if !(1..most).contains(&self.mark.coefficients) {
+            return fault(RecordFault::Coefficients { found: self.mark.coefficients, most: most - 1 });
+        }
+        let digests = [Some(&self.key_commitment), Some(&self.reference.vertices_sha256)];
+        let of_files = [self.reference.file_sha256.as_ref(), self.copy.file_sha256.as_ref()];
+        if let Some(bad) = digests.into_iter().chain(of_files).flatten().find(|text| !is_digest(text)) {
+            return fault(RecordFault::Digest { text: bad.clone() });
+        }
+        if self.parts.is_empty() {
+            return fault(RecordFault::NoPart);
+        }
+        let options = Options {
+            key_path: None,
+            subject: None,
+            parameters: self.mark.parameters(),
+            layers: self.layers.clone(),
+            srs: self.srs.clone(),
+            record_path: None,
+        };
+        options.check().or_else(|error| fault(RecordFault::Value(Box::new(error))))?;
+        match self.recipient.trim().is_empty() {
+            true => fault(RecordFault::NoRecipient),
+            false => Ok(()),
+        }
+    }
+}
+
+fn is_digest(text: &str) -> bool {
+    text.len() == 64 && text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        distortion::{AngleChange, Areas, Displacement, Hausdorff, Overlaps, Validity},
+        record::TopologyEntry,
+        vertices::VertexTable,
+    };
+    use serde_json::{Value, json};
+
+    fn record() -> FingerprintRecord {
+        let vertices = VertexTable::new(vec![[0.0, 1.0]]).unwrap();
+        FingerprintRecord {
+            meshmark_record: VERSION,
+            software: "meshmark 0.1.0".into(),
+            key_commitment: SecretKey::from_bytes([7; 32]).commitment(),
+            recipient: "ACME GmbH".into(),
+            mark: FingerprintShape::new(256, &Parameters::default()),
+            layers: None,
+            srs: None,
+            reference: ReferenceEntry {
+                vertices: 1,
+                vertices_sha256: vertices.digest(),
+                file_sha256: None,
+                crs: Some("EPSG:3067".into()),
+            },
+            copy: CopyEntry { file_sha256: Some("0f".repeat(32)) },
+            parts: vec![PartEntry { sha256: PartDigest::of(&vertices), vertices: 1, patches: 1 }],
+            distortion: Distortion {
+                displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },
+                angles: AngleChange::at(&[]),
+                areas: Areas { polygons: 0, mean_change: 0.0, p99_change: 0.0, max_change: 0.0 },
+                hausdorff: Hausdorff { p99_m: 0.2, max_m: 0.3 },
+                validity: Validity { invalid_before: 0, invalid_after: 0, newly_invalid: 0 },
+                overlaps: Overlaps { before: 0, after: 0, new: 0, new_area_m2: 0.0, new_slivers: 0 },
+                topology: TopologyEntry { t_junctions: 0, attenuated_vertices: 0 },
+            },
+        }
+    }
+
+    fn changed(pointer: &str, value: Value) -> String {
+        let mut json: Value = serde_json::from_str(&record().to_json()).unwrap();
+        let (object, field) = pointer.rsplit_once('/').unwrap();
+        json.pointer_mut(object).unwrap()[field] = value;
+        json.to_string()
+    }
+
+    #[test]
+    fn a_record_reads_back_belongs_to_its_key_and_has_the_parameters_of_its_mark() {
+        let read = FingerprintRecord::from_json(&record().to_json()).unwrap();
+        assert_eq!(read, record());
+        assert!(read.is_of(&SecretKey::from_bytes([7; 32])) && !read.is_of(&SecretKey::from_bytes([8; 32])));
+        assert_eq!(read.mark.parameters(), Parameters::default());
+    }
+
+    #[test]
+    fn later_versions_may_add_fields_but_none_that_shapes_the_mark() {
+        let signed = FingerprintRecord::from_json(&changed("/signature", json!({ "ed25519": "00" })));
+        assert_eq!(signed.unwrap(), record());
+        for pointer in ["/mark/twist", "/parts/0/offset", "/reference/edition", "/distortion/colour"] {
+            let error = FingerprintRecord::from_json(&changed(pointer, json!(1))).unwrap_err().to_string();
+            assert!(error.contains("unknown field"), "{pointer}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_value_that_no_marking_writes_is_refused_by_its_name() {
+        for (pointer, value, words) in [
+            ("/meshmark_record", json!(3), "version 3 instead of 2"),
+            ("/mark/coefficients", json!(0), "0 coefficients"),
+            ("/mark/coefficients", json!(4096), "4096 coefficients"),
+            ("/mark/amplitude_m", json!(0.0), "AMPLITUDE=0"),
+            ("/mark/patch_size", json!(3), "PATCH_SIZE=3"),
+            ("/key_commitment", json!("434471506306423b"), "\"434471506306423b\" is no digest"),
+            ("/reference/vertices_sha256", json!("0F".repeat(32)), "is no digest"),
+            ("/copy/file_sha256", json!("?"), "\"?\" is no digest"),
+            ("/parts", json!([]), "no part"),
+            ("/parts/0/sha256", json!("00"), "64 hexadecimal digits"),
+            ("/recipient", json!(" "), "no recipient"),
+            ("/recipient", json!(null), "invalid type: null"),
+        ] {
+            let error = FingerprintRecord::from_json(&changed(pointer, value)).unwrap_err().to_string();
+            assert!(error.contains("malformed record") && error.contains(words), "{pointer}: {error}");
+        }
+    }
+}

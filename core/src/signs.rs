@@ -1,0 +1,74 @@
+//! Secret signs: sequences of ±1 that a seed determines.
+
+use rand_chacha::{
+    ChaCha20Rng,
+    rand_core::{Rng, SeedableRng},
+};
+
+/// Every so many coefficients of a fingerprint there is a pilot, see [`crate::fingerprint`].
+pub(crate) const PILOT_EVERY: usize = 8;
+
+/// Returns whether coefficient `i`, counted from 1, is a pilot.
+pub(crate) fn is_pilot(i: usize) -> bool {
+    i.is_multiple_of(PILOT_EVERY)
+}
+
+/// A mark as the sign of every coefficient.
+pub trait Signs: Sync {
+    /// Returns the signs of coefficients 1 … `count` of a patch and axis (0 = x, 1 = y).
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64>;
+}
+
+impl Signs for &dyn Signs {
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        (**self).signs(patch, axis, count)
+    }
+}
+
+/// Secret signs for all coefficients: those of a patch and axis are the bits of ChaCha20 stream
+/// 2·patch + axis, least significant bit of each 64-bit word first; a 1 is +1, a 0 is −1.
+#[derive(Clone, Copy)]
+pub struct Sequence {
+    seed: [u8; 32],
+}
+
+impl Sequence {
+    /// Creates the sequence of a seed.
+    pub(crate) fn new(seed: [u8; 32]) -> Self {
+        Sequence { seed }
+    }
+
+    /// Returns the signs of a patch and axis, 64 in each word.
+    pub(crate) fn words(&self, patch: usize, axis: usize) -> impl Iterator<Item = u64> {
+        let mut stream = ChaCha20Rng::from_seed(self.seed);
+        stream.set_stream((2 * patch + axis) as u64);
+        std::iter::repeat_with(move || stream.next_u64())
+    }
+}
+
+impl Signs for Sequence {
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        let of_word = |word: u64| (0..64).map(move |i| if word >> i & 1 == 1 { 1.0 } else { -1.0 });
+        self.words(patch, axis).flat_map(of_word).take(count).collect()
+    }
+}
+
+/// Returns the value with the sign of bit `i` of a word of a [`Sequence`].
+pub(crate) fn signed(value: f64, word: u64, i: usize) -> f64 {
+    f64::from_bits(value.to_bits() ^ (!word >> i) << 63)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_times_its_sign_has_the_sign_of_its_bit() {
+        let sequence = Sequence::new([9; 32]);
+        let signs = sequence.signs(7, 1, 100);
+        let words: Vec<u64> = sequence.words(7, 1).take(2).collect();
+        for (i, sign) in signs.iter().enumerate() {
+            assert_eq!(signed(-2.5, words[i / 64], i % 64), -2.5 * sign, "{i}");
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! What a fingerprint shows, and that nobody can make one without the key.
+
+use meshmark_core::{
+    Error,
+    agreement::{Agreement, Evidence},
+    carrier::Carrier,
+    deformation::Prediction,
+    embedding,
+    estimation::Estimates,
+    fingerprint::{self, FingerprintEmbedding, check_score, embed, pilots, recipient_signs},
+    ground::Ground,
+    key::SecretKey,
+    map::Map,
+    map_data::{ChainKind, MapData},
+    message::Message,
+    modulation::{SpreadMessage, displacements_m},
+    options::{Parameters, Rigidity},
+    part::PartDigest,
+    patches::Patches,
+    signs::Signs,
+};
+
+const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
+const COEFFICIENTS: usize = fingerprint::COEFFICIENTS;
+
+fn key() -> SecretKey {
+    SecretKey::from_bytes([42; 32])
+}
+
+/// 400 houses of five corners, unevenly placed.
+fn town() -> MapData {
+    const HOUSE: [[f64; 2]; 6] = [[0.0, 0.0], [9.0, 0.0], [9.0, 7.0], [4.0, 7.0], [0.0, 6.0], [0.0, 0.0]];
+    let house = |i: usize| [(i % 20 * 20 + i % 7) as f64, (i / 20 * 20 + i % 3) as f64];
+    let coords = (0..400).flat_map(|i| HOUSE.map(|[x, y]| [x + house(i)[0], y + house(i)[1]]));
+    let starts: Vec<u32> = (0..2400).step_by(6).collect();
+    MapData::from_chains(coords.collect(), &starts, vec![ChainKind::Shell; 400]).unwrap().0
+}
+
+/// Displacements of the vertices of a copy, metres.
+fn displaced(town: &MapData, coords: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+    let pairs = town.vertices.coords().iter().zip(coords);
+    pairs.map(|(from, to)| Some([to[0] - from[0], to[1] - from[1]])).collect()
+}
+
+fn estimates(map: &Map, observed: &[Option<[f64; 2]>], parameters: &Parameters) -> Estimates {
+    let patches = Patches::new(map, parameters).unwrap();
+    let noise = Prediction::of_noise(0.01, observed.len());
+    Estimates::new(&patches, observed, COEFFICIENTS, parameters, &noise, &|_| ()).unwrap()
+}
+
+fn agreement(town: &MapData, seen: &Estimates, recipient: &str) -> Agreement {
+    let signs = recipient_signs(&key(), &PartDigest::of(&town.vertices), recipient);
+    Evidence::of_recipients(seen).agreement(&signs)
+}
+
+#[test]
+fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_free_or_rigid() {
+    let town = town();
+    let map = town.on(METRES, None);
+    for shape in [Rigidity::Free, Rigidity::Rigid] {
+        let parameters = Parameters { shape, ..Parameters::default() };
+        let copy = embed(&map, &key(), "ACME", COEFFICIENTS, &parameters).unwrap();
+        let mut observed = displaced(&town, &copy.coords);
+        let whole = estimates(&map, &observed, &parameters);
+        let own = agreement(&town, &whole, "ACME");
+        assert_eq!(own.signs, 4 * 2 * COEFFICIENTS * 7 / 8, "{shape:?}");
+        // A free map shows every sign; a body of five corners has three degrees of freedom for ten.
+        let (least_score, least_share) = if shape == Rigidity::Free { (42.0, 0.99) } else { (28.0, 0.75) };
+        assert!(own.score > least_score, "{shape:?} {own:?}");
+        assert!(own.agreeing as f64 > least_share * own.signs as f64, "{shape:?} {own:?}");
+        let part = PartDigest::of(&town.vertices);
+        assert!(Evidence::of_pilots(&whole).agreement(&pilots(&key(), &part)).score > 10.0);
+        observed.iter_mut().enumerate().filter(|(i, _)| i % 3 > 0).for_each(|(_, o)| *o = None);
+        let third = estimates(&map, &observed, &parameters);
+        assert!(agreement(&town, &third, "ACME").score > 20.0, "{shape:?}");
+        for seen in [&whole, &third] {
+            for other in 0..40 {
+                let other = agreement(&town, seen, &format!("ACME {other}"));
+                assert!(other.score.abs() < 5.0, "{shape:?} {other:?}");
+            }
+            let wrong = pilots(&SecretKey::from_bytes([43; 32]), &part);
+            assert!(Evidence::of_pilots(seen).agreement(&wrong).score.abs() < 5.0);
+        }
+    }
+}
+
+#[test]
+fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
+    let town = town();
+    let (map, key, parameters) = (town.on(METRES, None), key(), Parameters::default());
+    let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
+    let embedding = embedding.for_many().unwrap();
+    let names = ["ACME", "Öster AB"];
+    let all = names.map(|name| embedding.fingerprint(name));
+    let wanted = embedding.wanted(&all, &|_| ()).unwrap();
+    for ((name, fingerprint), wanted) in names.iter().zip(&all).zip(&wanted) {
+        let together = embedding.settle(fingerprint, wanted).unwrap();
+        assert_eq!(together, embed(&map, &key, name, COEFFICIENTS, &parameters).unwrap());
+    }
+}
+
+#[test]
+fn the_displacement_is_that_of_a_message() {
+    let town = town();
+    let (map, parameters) = (town.on(METRES, None), Parameters::default());
+    let of_recipient = embed(&map, &key(), "ACME", COEFFICIENTS, &parameters).unwrap().displacement;
+    let message = Message::from_bytes(&[0x5a; 16]);
+    let of_message = embedding::embed(&map, &key(), &message, &parameters).unwrap().displacement;
+    assert!((of_recipient.rms_m / of_message.rms_m - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn a_map_without_room_and_a_mark_without_effect_are_refused() {
+    let town = town();
+    let map = town.on(METRES, None);
+    let small = Parameters { patch_size: 250, ..Parameters::default() };
+    let refused = embed(&map, &key(), "ACME", COEFFICIENTS, &small).unwrap_err();
+    assert!(matches!(refused, Error::TooManySigns { coefficients: COEFFICIENTS, vertices: 250, .. }));
+    assert!(refused.to_string().ends_with("use a larger PATCH_SIZE"), "{refused}");
+    let coarse = Parameters { precision_crs_units: Some(0.7), amplitude_m: 0.01, ..Parameters::default() };
+    let lost = embed(&map, &key(), "ACME", COEFFICIENTS, &coarse).unwrap_err();
+    assert!(matches!(lost, Error::FingerprintLost { .. }), "{lost}");
+    assert!(check_score(7.9).is_err() && check_score(8.1).is_ok());
+}
+
+/// Signs that somebody made up.
+struct Forged<F>(F);
+
+impl<F: Fn(usize, usize, usize) -> Vec<f64> + Sync> Signs for Forged<F> {
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        self.0(patch, axis, count)
+    }
+}
+
+/// The signs that a copy shows to whoever has the unmarked map, too.
+fn signs_of_copy(map: &Map, town: &MapData, coords: &[[f64; 2]], parameters: &Parameters) -> Vec<f64> {
+    let seen = estimates(map, &displaced(town, coords), parameters);
+    seen.values.iter().map(|value| value.signum()).collect()
+}
+
+fn of_axis(all: &[f64], patch: usize, axis: usize, count: usize) -> Vec<f64> {
+    all[(2 * patch + axis) * count..][..count].to_vec()
+}
+
+#[test]
+fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
+    let town = town();
+    let (map, parameters) = (town.on(METRES, None), Parameters::default());
+    let patches = Patches::new(&map, &parameters).unwrap();
+    // Messages: the copy of A and its message give the chips, and the chips any other message.
+    let [a, b] = ["A", "B"].map(|name| key().recipient_message(name));
+    let copy_of_a = embedding::embed(&map, &key(), &a, &parameters).unwrap();
+    let shown = signs_of_copy(&map, &town, &copy_of_a.coords, &parameters);
+    let code = parameters.code;
+    let turned: Vec<f64> = code.encode(&a).iter().zip(code.encode(&b)).map(|(a, b)| a * b).collect();
+    let turn = |patch, axis, count| -> Vec<f64> {
+        of_axis(&shown, patch, axis, count).iter().zip(&turned).map(|(sign, turn)| sign * turn).collect()
+    };
+    let score_of_b = |forged: &dyn Signs| {
+        let mut moved = displacements_m(&patches, &[forged], COEFFICIENTS, &parameters).unwrap();
+        let observed: Vec<_> = moved.remove(0).into_iter().map(Some).collect();
+        let seen = estimates(&map, &observed, &parameters);
+        let carrier = Carrier::new(&key());
+        let real = SpreadMessage::new(&carrier, &b, &parameters);
+        let axes = (0..patches.as_slice().len()).flat_map(|patch| [(patch, 0), (patch, 1)]);
+        let real: Vec<f64> = axes.flat_map(|(patch, axis)| real.signs(patch, axis, COEFFICIENTS)).collect();
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let message = dot(&real, &seen.values) / dot(&seen.values, &seen.values).sqrt();
+        (message, agreement(&town, &seen, "B").score)
+    };
+    let (message, fingerprint) = score_of_b(&Forged(turn));
+    assert!(message > 40.0, "the attack succeeds against messages: {message}");
+    assert!(fingerprint.abs() < 5.0, "{fingerprint}");
+
+    // Fingerprints: the copies of others, turned by whatever their names give without the key,
+    // mixed, or as they are.
+    let copies = ["A", "C", "D"].map(|name| {
+        let copy = embed(&map, &key(), name, COEFFICIENTS, &parameters).unwrap();
+        signs_of_copy(&map, &town, &copy.coords, &parameters)
+    });
+    let public =
+        |name: &str| recipient_signs(&SecretKey::from_bytes([0; 32]), &PartDigest::of(&town.vertices), name);
+    let product = |x: Vec<f64>, y: Vec<f64>| x.iter().zip(&y).map(|(x, y)| x * y).collect::<Vec<_>>();
+    let as_it_is = |patch, axis, count| of_axis(&copies[0], patch, axis, count);
+    let renamed = |patch, axis, count| {
+        let names = product(public("A").signs(patch, axis, count), public("B").signs(patch, axis, count));
+        product(of_axis(&copies[0], patch, axis, count), names)
+    };
+    let coded = |patch, axis, count| product(of_axis(&copies[0], patch, axis, count), turned.clone());
+    let mixed = |patch, axis, count| {
+        let [a, c, d] = copies.each_ref().map(|copy| of_axis(copy, patch, axis, count));
+        product(product(a, c), d)
+    };
+    let majority = |patch, axis, count| {
+        let [a, c, d] = copies.each_ref().map(|copy| of_axis(copy, patch, axis, count));
+        (0..count).map(|i| (a[i] + c[i] + d[i]).signum()).collect()
+    };
+    let attempts: [&dyn Signs; 5] =
+        [&Forged(as_it_is), &Forged(renamed), &Forged(coded), &Forged(mixed), &Forged(majority)];
+    for (number, attempt) in attempts.into_iter().enumerate() {
+        let (_, fingerprint) = score_of_b(attempt);
+        assert!(fingerprint.abs() < 5.0, "attempt {number}: {fingerprint}");
+    }
+}

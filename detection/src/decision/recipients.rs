@@ -1,0 +1,121 @@
+//! The decision on fingerprints: one null hypothesis for all.
+//!
+//! *Was this recipient's copy used?* For a recipient who had no part in the suspect, the signs are
+//! random and independent of it, whatever happened to it, and under a wrong key they are so for
+//! everybody. The score T is then a weighted sum of independent random signs of variance 1, whose
+//! tail is bounded without any assumption about the weights ([`survival::signs_log10`]). Among many
+//! candidates, p is multiplied by their number (Bonferroni).
+//!
+//! *Who else?* In a mixture of copies everybody's share is noise for the others. Candidates that are
+//! certain are taken out, and the others are scored on what remains (joint decoding: P. Meerwald,
+//! T. Furon, *Towards joint Tardos decoding: the "Don Quixote" algorithm*, Information Hiding,
+//! LNCS 6958, 2011). What remains depends on the suspect and on those taken out alone, so that the
+//! signs of an innocent candidate are independent of it, too. Round m multiplies p by m (m + 1):
+//! the sum of 1 / (m (m + 1)) is 1, so that the significance is that of all rounds together.
+
+use super::survival;
+use meshmark_core::{
+    Result,
+    agreement::{Agreement, Evidence},
+    signs::Sequence,
+};
+use rayon::prelude::*;
+
+/// A mark of a key is detected, whoever its recipient is, where the p-value of the pilots is below
+/// 10 to this power.
+const DETECTED_LOG10: f64 = -9.0;
+/// More rounds name nobody else: every round needs stronger evidence.
+const MOST_ROUNDS: usize = 20;
+
+/// Returns log₁₀ of a bound of the probability of this score for a recipient, or for pilots, that
+/// have nothing to do with the suspect.
+pub fn p_log10(score: f64) -> f64 {
+    survival::signs_log10(score)
+}
+
+/// Returns the least score that a recipient, one of the `tried`, needs to be named.
+pub fn needed_score(tried: usize, significance: f64) -> f64 {
+    survival::signs_quantile(significance / (tried as f64 * 10f64.powf(rounds_log10(1, tried))))
+}
+
+/// Returns whether a mark of the key is detected, given the score of its pilots.
+pub fn shows_key(score: f64) -> bool {
+    p_log10(score) < DETECTED_LOG10
+}
+
+/// A candidate among all that were tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// The agreement with the whole suspect.
+    pub agreement: Agreement,
+    /// The score in the round of the smallest p-value, on what other recipients left.
+    pub score: f64,
+    /// The round of the smallest p-value, counted from 1: how often others were taken out, and 1.
+    pub round: usize,
+    /// log₁₀ of the smallest p-value of all rounds, times the number of candidates and the factor of
+    /// the round.
+    pub p_value_log10: f64,
+    /// Whether this p-value is below the significance.
+    pub is_named: bool,
+}
+
+/// Returns the standing of every candidate in evidence alone, in the order given.
+pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significance: f64) -> Vec<Standing> {
+    let linear = |named: &[usize], _: &[usize]| {
+        Ok(evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>()))
+    };
+    name_in_rounds(evidence, candidates, significance, linear).expect("nothing fails")
+}
+
+/// Returns the standing of every candidate, in the order given. `rest` returns what remains without
+/// some, of which the second ones were named in the last round; it may depend on the suspect and on
+/// them alone.
+///
+/// # Errors
+/// Returns the errors of `rest`.
+pub fn name_in_rounds(
+    evidence: &Evidence,
+    candidates: &[Sequence],
+    significance: f64,
+    mut rest: impl FnMut(&[usize], &[usize]) -> Result<Evidence>,
+) -> Result<Vec<Standing>> {
+    let tried = candidates.len();
+    let first = |signs: &Sequence| {
+        let agreement = evidence.agreement(signs);
+        let p_value_log10 = p_value_log10(agreement.score, 1, tried);
+        let is_named = p_value_log10 < significance.log10();
+        Standing { agreement, score: agreement.score, round: 1, p_value_log10, is_named }
+    };
+    let mut standings: Vec<Standing> = candidates.par_iter().map(first).collect();
+    let (mut named, mut round) = (Vec::new(), 1);
+    while round < MOST_ROUNDS {
+        round += 1;
+        let new: Vec<usize> = (0..tried).filter(|k| standings[*k].is_named && !named.contains(k)).collect();
+        named.extend(&new);
+        if new.is_empty() || named.len() == tried {
+            break;
+        }
+        let rest = rest(&named, &new)?;
+        let again = |(standing, signs): (&mut Standing, &Sequence)| {
+            let score = rest.agreement(signs).score;
+            let p_value_log10 = p_value_log10(score, round, tried);
+            if p_value_log10 < standing.p_value_log10 {
+                let is_named = p_value_log10 < significance.log10();
+                *standing = Standing { score, round, p_value_log10, is_named, ..*standing };
+            }
+        };
+        let others = standings.par_iter_mut().zip(candidates).filter(|(standing, _)| !standing.is_named);
+        others.for_each(again);
+    }
+    Ok(standings)
+}
+
+/// Returns log₁₀ of the p-value of a score in a round among so many candidates.
+fn p_value_log10(score: f64, round: usize, tried: usize) -> f64 {
+    (p_log10(score) + (tried as f64).log10() + rounds_log10(round, tried)).min(0.0)
+}
+
+/// Returns log₁₀ of the factor of a round. A single candidate has no second round.
+fn rounds_log10(round: usize, tried: usize) -> f64 {
+    if tried == 1 { 0.0 } else { ((round * (round + 1)) as f64).log10() }
+}
