@@ -16,7 +16,8 @@ pub fn p_any_message_log10(found: &Demodulation, chip_rate: usize) -> Option<f64
     (degrees > 0).then(|| survival::chi_squared_log10(score, degrees))
 }
 
-/// Returns whether a mark of the key is detected, given the result of [`p_any_message_log10`].
-pub fn shows_key(p_any_message_log10: Option<f64>) -> bool {
-    p_any_message_log10.is_some_and(|p| p < DETECTED_LOG10)
+/// Returns whether a mark of the key is detected, given log₁₀ of the p-value for any message, or of
+/// the pilots of fingerprints.
+pub fn shows_key(p_log10: Option<f64>) -> bool {
+    p_log10.is_some_and(|p| p < DETECTED_LOG10)
 }

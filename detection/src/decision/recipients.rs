@@ -13,7 +13,7 @@
 //! signs of an innocent candidate are independent of it, too. Round m multiplies p by m (m + 1):
 //! the sum of 1 / (m (m + 1)) is 1, so that the significance is that of all rounds together.
 
-use super::survival;
+use super::{any_message, survival};
 use meshmark_core::{
     Result,
     agreement::{Agreement, Evidence},
@@ -21,9 +21,6 @@ use meshmark_core::{
 };
 use rayon::prelude::*;
 
-/// A mark of a key is detected, whoever its recipient is, where the p-value of the pilots is below
-/// 10 to this power.
-const DETECTED_LOG10: f64 = -9.0;
 /// More rounds name nobody else: every round needs stronger evidence.
 const MOST_ROUNDS: usize = 20;
 
@@ -40,7 +37,7 @@ pub fn needed_score(tried: usize, significance: f64) -> f64 {
 
 /// Returns whether a mark of the key is detected, given the score of its pilots.
 pub fn shows_key(score: f64) -> bool {
-    p_log10(score) < DETECTED_LOG10
+    any_message::shows_key(Some(p_log10(score)))
 }
 
 /// A candidate among all that were tried.

@@ -124,6 +124,9 @@ impl Search<'_> {
     /// Registers by the course of lines; `None` where no more of them agree than by chance, or
     /// where the suspect is in its place already.
     fn along_curves(&self, pairs: &[PlacePair]) -> Option<Registration> {
+        if self.suspect.segments.is_empty() {
+            return None;
+        }
         let registrar = self.registrar;
         let plane = Plane::new(registrar.ground, registrar.reference.vertices.centre());
         let curves = Curves::new(registrar.reference, self.suspect, plane, registrar.radius_m);
