@@ -81,6 +81,7 @@ impl fmt::Display for KeyFault {
 pub enum RecordFault {
     Json(serde_json::Error),
     Version { found: u32, expected: u32 },
+    UnknownVersion { found: u32 },
     Value(Box<Error>),
     WhitenedRecipient,
     Coefficients { found: usize, most: usize },
@@ -97,6 +98,7 @@ impl fmt::Display for RecordFault {
                 f.write_str(source.to_string().split(", expected one of").next().unwrap_or_default())
             }
             RecordFault::Version { found, expected } => write!(f, "version {found} instead of {expected}"),
+            RecordFault::UnknownVersion { found } => write!(f, "version {found} instead of 1 or 2"),
             RecordFault::Value(source) => source.fmt(f),
             RecordFault::WhitenedRecipient => {
                 f.write_str("it has a recipient and a whitened message, of which only one can be")

@@ -8,7 +8,7 @@ use crate::{
     Error, Result,
     error::RecordFault,
     key::SecretKey,
-    options::{Laplacian, Options, PATCH_SIZE_RANGE, Parameters, Rigidity},
+    options::{Laplacian, Options, PATCH_SIZE_RANGE, Parameters, Rigidity, Subject},
     part::PartDigest,
     record::Distortion,
 };
@@ -148,6 +148,19 @@ impl FingerprintRecord {
         self.key_commitment == key.commitment()
     }
 
+    /// Returns the options that made the mark.
+    pub fn options(&self) -> Options {
+        Options {
+            key_path: None,
+            subject: Some(Subject::Recipient(self.recipient.clone())),
+            parameters: self.mark.parameters(),
+            coefficients: Some(self.mark.coefficients),
+            layers: self.layers.clone(),
+            srs: self.srs.clone(),
+            record_path: None,
+        }
+    }
+
     fn check(&self) -> Result<()> {
         let fault = |fault| Err(Error::Record(fault));
         if self.meshmark_record != VERSION {
@@ -165,19 +178,10 @@ impl FingerprintRecord {
         if self.parts.is_empty() {
             return fault(RecordFault::NoPart);
         }
-        let options = Options {
-            key_path: None,
-            subject: None,
-            parameters: self.mark.parameters(),
-            layers: self.layers.clone(),
-            srs: self.srs.clone(),
-            record_path: None,
-        };
-        options.check().or_else(|error| fault(RecordFault::Value(Box::new(error))))?;
-        match self.recipient.trim().is_empty() {
-            true => fault(RecordFault::NoRecipient),
-            false => Ok(()),
+        if self.recipient.trim().is_empty() {
+            return fault(RecordFault::NoRecipient);
         }
+        self.options().check().or_else(|error| fault(RecordFault::Value(Box::new(error))))
     }
 }
 

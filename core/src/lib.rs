@@ -71,6 +71,7 @@ pub mod part;
 pub mod patches;
 mod placement;
 pub mod record;
+pub mod recorded;
 mod response;
 pub mod scale;
 mod sides;

@@ -148,6 +148,7 @@ impl Record {
             key_path: None,
             subject: Some(self.subject()?),
             parameters: self.parameters.clone(),
+            coefficients: None,
             layers: self.layers.clone(),
             srs: self.srs.clone(),
             record_path: None,

@@ -31,6 +31,9 @@ pub struct Options {
     pub subject: Option<Subject>,
     /// The numbers.
     pub parameters: Parameters,
+    /// Coefficients of a patch and axis that carry the fingerprint of a recipient; `None` where a
+    /// message is carried.
+    pub coefficients: Option<usize>,
     /// Layers to mark; all when `None`.
     pub layers: Option<Vec<String>>,
     /// CRS of the source when it has none.
@@ -68,6 +71,7 @@ impl Options {
                 basis: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
                 precision_crs_units: values.number("PRECISION")?,
             },
+            coefficients: None,
             layers: values.list("LAYERS")?,
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
@@ -80,14 +84,14 @@ impl Options {
     /// # Panics
     /// Panics when `option` is no row of [`OPTIONS`].
     pub fn text_of(&self, option: &str) -> Option<String> {
-        let p = &self.parameters;
+        let (p, is_message) = (&self.parameters, self.coefficients.is_none());
         match option {
             "KEY" => self.key_path.clone(),
             "RECIPIENT" => self.subject.as_ref()?.recipient().map(String::from),
             "MESSAGE" => self.subject.as_ref()?.given_message().map(Message::to_hex),
             "AMPLITUDE" => Some(p.amplitude_m.to_string()),
-            "CODE" => Some(p.code.name()),
-            "CHIP_RATE" => Some(p.chip_rate.to_string()),
+            "CODE" => is_message.then(|| p.code.name()),
+            "CHIP_RATE" => is_message.then(|| p.chip_rate.to_string()),
             "PATCH_SIZE" => Some(p.patch_size.to_string()),
             "TOLERANCE" => Some(p.tolerance_m.to_string()),
             "PRECISION" => p.precision_crs_units.map(|precision| precision.to_string()),
