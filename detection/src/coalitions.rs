@@ -27,7 +27,8 @@ const MOST_NOISE_M: f64 = 0.1;
 const LEAST_REST: f64 = 0.1;
 
 impl Matched<'_> {
-    /// Returns the standing of every candidate in the evidence `seen`, in the order given; see
+    /// Returns the standing of every candidate in the evidence `seen`, in the order given. They are
+    /// all or some of those `tried`, whose significance together is this one; see
     /// [`recipients::name_in_rounds`].
     ///
     /// # Errors
@@ -37,14 +38,14 @@ impl Matched<'_> {
         seen: &Estimated,
         candidates: &[Fingerprint],
         parameters: &Parameters,
-        significance: f64,
+        (tried, significance): (usize, f64),
     ) -> Result<Vec<Standing>> {
         let evidence = Evidence::of_recipients(&seen.estimates);
         let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
         let mut observed = seen.observed.clone();
         let shows_vertices =
             seen.disturbance.deformation.noise_m <= MOST_NOISE_M && !seen.observations.is_of_features();
-        recipients::name_in_rounds(&evidence, &signs, significance, |named, new| {
+        recipients::name_in_rounds(&evidence, &signs, (tried, significance), |named, new| {
             let named: Vec<Sequence> = named.iter().map(|&k| signs[k]).collect();
             let rest = evidence.without(&named);
             if !shows_vertices || rest.energy() < LEAST_REST * evidence.energy() {

@@ -99,7 +99,7 @@ fn standings(corners: Vec<[f64; 2]>) -> Vec<Standing> {
     let marks: Vec<_> = (0..CANDIDATES).map(|k| Fingerprint::new(&TOWN.key, &TOWN.part, &name(k))).collect();
     with_suspect(corners, |matched| {
         let seen = matched.estimate(&parameters, &|_| ()).unwrap();
-        matched.name_recipients(&seen, &marks, &parameters, SIGNIFICANCE).unwrap()
+        matched.name_recipients(&seen, &marks, &parameters, (marks.len(), SIGNIFICANCE)).unwrap()
     })
 }
 

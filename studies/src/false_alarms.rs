@@ -22,7 +22,11 @@ use meshmark_host_tests::{
     attacks::{Attack, Map, OtherMaps, Random, extended_rows, noise, paper_rows},
     product::{Marking, Product, Profile, random_key},
 };
-use meshmark_verifier::{Request, progress::Progress, verify};
+use meshmark_verifier::{
+    Request,
+    progress::Progress,
+    verify::{self, Found, Sought},
+};
 use plotters::style::{BLACK, BLUE, RED};
 use serde::Serialize;
 use std::{
@@ -111,7 +115,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         suspect: suspect.into(),
         record: None,
         subject: None,
-        bits: 128,
+        sought: Sought::Message { bits: 128 },
         parameters: Parameters { precision_crs_units: Some(PRECISION_M), ..Parameters::default() },
         layers: None,
         srs: None,
@@ -125,7 +129,10 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     };
     let mut progress = Progress::default();
     let map = verify::read_reference(&request, &mut progress)?.or_fail()?;
-    Ok(verify::examine(&request, &map, &mut progress)?.or_fail()?.found?)
+    match verify::examine(&request, &map, &mut progress)?.or_fail()?.found? {
+        Found::Message(evidence) => Ok(evidence.demodulation),
+        Found::Fingerprint(_) => unreachable!("a message is sought"),
+    }
 }
 
 fn decide(found: &Demodulation, carried: Message) -> Decision {

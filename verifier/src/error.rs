@@ -90,6 +90,18 @@ pub enum Error {
         "the record was made with key {made_with}, and this is key {given}: give the key it was made with"
     )]
     OtherKey { made_with: String, given: String },
+    #[error("the record was made with another key than this one, {given}: give the key it was made with")]
+    OtherCommitment { given: String },
+    #[error(
+        "the record names {} that are not the vertices of its reference: verify with the version of meshmark that wrote it",
+        counted(*parts, "part")
+    )]
+    OtherParts { parts: usize },
+    #[error(
+        "the demodulator of the paper reads messages, and the mark is the fingerprint of a recipient: leave --demodulator \
+         out"
+    )]
+    PaperOfFingerprint,
     #[error("the record's message is not that of its recipient under this key: the record was changed")]
     OtherMessage,
     #[error(

@@ -50,7 +50,7 @@ fn make_files(folder: &Path) {
     write("record_of_another_reference.json", record.replace("ce0eba", "ce0ebb").as_bytes());
     write("record_of_another_message.json", record.replace("095abf", "f95abf").as_bytes());
     write("record_of_another_recipient.json", record.replace("ACME GmbH", "Another Ltd").as_bytes());
-    write("record_of_a_later_version.json", record.replace("_record\": 1", "_record\": 2").as_bytes());
+    write("record_of_a_later_version.json", record.replace("_record\": 1", "_record\": 3").as_bytes());
     write("record_with_a_negative_amplitude.json", record.replace("0.1,", "-0.1,").as_bytes());
     write("record_with_a_comment.json", record.replacen("{", "{ \"comment\": \"\",", 1).as_bytes());
     make_records(folder, &record);

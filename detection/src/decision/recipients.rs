@@ -58,13 +58,15 @@ pub struct Standing {
 
 /// Returns the standing of every candidate in evidence alone, in the order given.
 pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significance: f64) -> Vec<Standing> {
+    let tried = candidates.len();
     let linear = |named: &[usize], _: &[usize]| {
         Ok(evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>()))
     };
-    name_in_rounds(evidence, candidates, significance, linear).expect("nothing fails")
+    name_in_rounds(evidence, candidates, (tried, significance), linear).expect("nothing fails")
 }
 
-/// Returns the standing of every candidate, in the order given. `rest` returns what remains without
+/// Returns the standing of every candidate, in the order given; `tried` counts them and those that
+/// are scored on other evidence, and the significance is for all of these. `rest` returns what remains without
 /// some, of which the second ones were named in the last round; it may depend on the suspect and on
 /// them alone.
 ///
@@ -73,10 +75,9 @@ pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significanc
 pub fn name_in_rounds(
     evidence: &Evidence,
     candidates: &[Sequence],
-    significance: f64,
+    (tried, significance): (usize, f64),
     mut rest: impl FnMut(&[usize], &[usize]) -> Result<Evidence>,
 ) -> Result<Vec<Standing>> {
-    let tried = candidates.len();
     let first = |signs: &Sequence| {
         let agreement = evidence.agreement(signs);
         let p_value_log10 = p_value_log10(agreement.score, 1, tried);
@@ -87,9 +88,10 @@ pub fn name_in_rounds(
     let (mut named, mut round) = (Vec::new(), 1);
     while round < MOST_ROUNDS {
         round += 1;
-        let new: Vec<usize> = (0..tried).filter(|k| standings[*k].is_named && !named.contains(k)).collect();
+        let new: Vec<usize> =
+            (0..candidates.len()).filter(|k| standings[*k].is_named && !named.contains(k)).collect();
         named.extend(&new);
-        if new.is_empty() || named.len() == tried {
+        if new.is_empty() || named.len() == candidates.len() {
             break;
         }
         let rest = rest(&named, &new)?;

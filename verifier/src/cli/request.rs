@@ -3,11 +3,15 @@
 use super::arguments::VerifyArgs;
 use meshmark_core::{
     key::RECIPIENT_BITS,
-    options::{Options, Spelling},
-    record::Record,
+    options::{Options, Spelling, Subject},
+    recorded::Recorded,
 };
-use meshmark_detection::matching::RadiusChoice;
-use meshmark_verifier::{Error, Request, Result, inputs::texts, verify::check_key};
+use meshmark_detection::{Demodulator, matching::RadiusChoice};
+use meshmark_verifier::{
+    Error, Request, Result,
+    inputs::texts,
+    verify::{Sought, check_key},
+};
 
 /// Combines key, record and flags.
 pub(super) fn request(args: VerifyArgs) -> Result<Request> {
@@ -23,8 +27,21 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         }
         None => options,
     };
+    let demodulator = args.demodulator.into();
+    let sought = match options.coefficients {
+        Some(_) if demodulator == Demodulator::Paper => return Err(Error::PaperOfFingerprint),
+        Some(coefficients) => {
+            let recipient = options.subject.as_ref().and_then(Subject::recipient);
+            let recipients = recipient.map(String::from).into_iter().collect();
+            Sought::Fingerprint { coefficients, recipients, tried: 1 }
+        }
+        None => {
+            let bits = options.subject.as_ref().map(|subject| subject.message(&key).len());
+            Sought::Message { bits: bits.unwrap_or(RECIPIENT_BITS) }
+        }
+    };
     Ok(Request {
-        bits: options.subject.as_ref().map_or(RECIPIENT_BITS, |subject| subject.message(&key).len()),
+        sought,
         subject: options.subject,
         key,
         reference: args.reference.into_iter().next().expect("one is required"),
@@ -35,7 +52,7 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         srs: options.srs,
         landmarks: args.landmark,
         registration: args.registration.into(),
-        demodulator: args.demodulator.into(),
+        demodulator,
         radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
         significance: args.significance,
         sketch: args.report.is_some(),
@@ -44,13 +61,13 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
 }
 
 /// Checks that flags agree with the record, which they may repeat.
-fn check_flags(flags: &[(&'static str, String)], record: &Record) -> Result<()> {
+fn check_flags(flags: &[(&'static str, String)], record: &Recorded) -> Result<()> {
     let recorded = record.options()?;
     for (name, value) in flags {
         let alone = Options::parse([(*name, value.as_str())])?;
-        let on_record = match *name {
-            // A record has the message of its recipient, too.
-            "MESSAGE" => Some(record.message()?.to_hex()),
+        let on_record = match (*name, record) {
+            // A record of a message has that of its recipient, too.
+            ("MESSAGE", Recorded::Message(record)) => Some(record.message()?.to_hex()),
             _ => recorded.text_of(name),
         };
         if alone.text_of(name) != on_record {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     inputs::digests::Digested,
-    report::{Candidates, Provenance, Report, explain},
+    report::{Candidates, MarkParameters, Provenance, Report, explain},
     words::{clipped, printable},
 };
 use maud::{Markup, html};
@@ -72,30 +72,22 @@ fn record(report: &Report, record: Option<&Digested>) -> Markup {
 /// Renders the assumed parameters of the mark, and those of the test.
 pub fn settings(report: &Report) -> Markup {
     let p = &report.parameters;
-    let Parameters {
-        amplitude_m,
-        code,
-        chip_rate,
-        patch_size,
-        tolerance_m,
-        shape,
-        basis,
-        precision_crs_units,
-    } = &p.mark;
+    let (what, carried, mark) = match &p.mark {
+        MarkParameters::Message(mark) => ("Message", message(mark), mark.clone()),
+        MarkParameters::Fingerprint(mark) => {
+            let coefficients = counted(mark.coefficients, "coefficient");
+            ("Fingerprint", format!("{coefficients} in every patch and axis"), mark.parameters())
+        }
+    };
+    let Parameters { amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, .. } = mark;
     let text = |text: String| Some(html! { (text) });
-    let chips = format!(
-        "{}, {} for each of its bits in every patch and axis; patches of {} vertices or more; basis {}",
-        if *code == Code::Ldpc { "as an error-correcting code word (LDPC)" } else { "repeated bits" },
-        counted(*chip_rate, "coefficient"),
-        patch_size,
-        word(basis)
-    );
+    let carried = format!("{carried}; patches of {patch_size} vertices or more; basis {}", word(&basis));
     let grid = precision_crs_units.map(|grid| html! { (grid) " CRS units" });
     let layers = p.layers.as_ref().map(|layers| html! { (printable(&join_list(layers))) });
     let content = table(&[
         ("Amplitude", text(format!("{amplitude_m} m on the ground, no vertex further than {tolerance_m} m"))),
-        ("Message", text(chips)),
-        ("Shape", text(format!("{} vertices", word(shape)))),
+        (what, text(carried)),
+        ("Shape", text(format!("{} vertices", word(&shape)))),
         ("Layers", Some(layers.unwrap_or_else(|| html! { "all" }))),
         ("Grid", Some(grid.unwrap_or_else(|| html! { "none" }))),
         ("Matching radius", text(format!("{} m{}", p.radius_m, report.radius_reason()))),
@@ -103,6 +95,15 @@ pub fn settings(report: &Report) -> Markup {
         ("Observed on", p.observations.as_ref().map(|observations| html! { (word(observations)) })),
     ]);
     section("How the mark was assumed to be made and tested", &content)
+}
+
+/// Describes how a message is carried.
+fn message(mark: &Parameters) -> String {
+    format!(
+        "{}, {} for each of its bits in every patch and axis",
+        if mark.code == Code::Ldpc { "as an error-correcting code word (LDPC)" } else { "repeated bits" },
+        counted(mark.chip_rate, "coefficient")
+    )
 }
 
 /// Returns the name of a value in the JSON report.
@@ -136,7 +137,7 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                     tr {
                         td { @match &entry.recipient {
                             Some(recipient) => (clipped(recipient)),
-                            None => code { (entry.message) },
+                            None => code { @if let Some(message) = &entry.message { (message) } },
                         } }
                         td { (printable(&entry.record)) }
                         td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } }

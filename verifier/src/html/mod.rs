@@ -4,6 +4,7 @@
 mod chart;
 mod compared;
 mod comparison;
+mod fingerprint;
 mod frame;
 mod limits;
 mod map;
@@ -15,7 +16,7 @@ mod words;
 
 pub use comparison::comparison;
 
-use crate::report::Report;
+use crate::report::{MarkParameters, Report};
 use maud::html;
 use page::page;
 
@@ -26,8 +27,10 @@ pub fn verification(report: &Report) -> String {
         (verdict::verdict(report))
         (compared::compared(report))
         (map::evidence(report))
-        (message::message(report))
-        (chart::decoys(report))
+        @match report.parameters.mark {
+            MarkParameters::Message(_) => { (message::message(report)) (chart::decoys(report)) }
+            MarkParameters::Fingerprint(_) => (fingerprint::fingerprint(report)),
+        }
         (registration::registration(report))
         (compared::settings(report))
         (limits::limits(report))

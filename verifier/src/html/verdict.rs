@@ -53,7 +53,7 @@ fn sentence(report: &Report) -> Markup {
                 " does not carry the mark of " (mark(report)) ", which would have shown"
                 @if let Some(odds) = odds { ": by chance, " (chance) " " (odds) } "."
             }
-            (Verdict::Inconclusive, _) if report.parameters.expected_message.is_none() => {
+            (Verdict::Inconclusive, _) if !report.is_of_somebody() => {
                 " was not compared with any copy: " (printable(&report.reason)) "."
             }
             (Verdict::Inconclusive, odds) => {

@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use meshmark_core::{
     key::{SecretKey, read_text},
-    record::Record,
+    recorded::Recorded,
 };
 use std::{fs::File, io, path::Path};
 use zeroize::Zeroizing;
@@ -14,8 +14,8 @@ pub fn key(path: &Path) -> Result<SecretKey> {
     SecretKey::from_json(&text).map_err(|source| Error::Malformed { path: path.into(), source })
 }
 
-/// Reads a record.
-pub fn record(path: &Path) -> Result<Record> {
+/// Reads a record of either version.
+pub fn record(path: &Path) -> Result<Recorded> {
     parsed_record(path).map_err(|bad| match bad {
         BadRecord::Unread(source) => Error::TextUnread { what: "record", path: path.into(), source },
         BadRecord::Malformed(source) => Error::Malformed { path: path.into(), source },
@@ -32,8 +32,8 @@ pub(crate) enum BadRecord {
 }
 
 /// Reads a record of many; the caller adds its name to errors.
-pub(crate) fn parsed_record(path: &Path) -> std::result::Result<Record, BadRecord> {
-    Record::from_json(&text(path).map_err(BadRecord::Unread)?).map_err(BadRecord::Malformed)
+pub(crate) fn parsed_record(path: &Path) -> std::result::Result<Recorded, BadRecord> {
+    Recorded::from_json(&text(path).map_err(BadRecord::Unread)?).map_err(BadRecord::Malformed)
 }
 
 fn text(path: &Path) -> io::Result<Zeroizing<String>> {

@@ -25,8 +25,8 @@ pub struct Entry {
     pub record: String,
     /// Recipient; null when the message was given as bits.
     pub recipient: Option<String>,
-    /// Message, hexadecimal.
-    pub message: String,
+    /// Message, hexadecimal; null where the mark is a fingerprint.
+    pub message: Option<String>,
     /// log₁₀ of the p-value times the number of candidates; null when nothing was decoded.
     pub p_value_log10: Option<f64>,
     /// Number of decoded bits that differ from the message; null when nothing was decoded.
@@ -55,9 +55,9 @@ impl Candidates {
 
 impl Entry {
     pub(crate) fn name(&self) -> String {
-        let whose = match &self.recipient {
-            Some(recipient) => printable(recipient),
-            None => format!("message {}", self.message),
+        let whose = match (&self.recipient, &self.message) {
+            (Some(recipient), _) => printable(recipient),
+            (None, message) => format!("message {}", message.as_deref().unwrap_or_default()),
         };
         format!("{whose} ({})", printable(&self.record))
     }

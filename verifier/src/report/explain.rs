@@ -94,6 +94,14 @@ fn found(report: &Report) -> Vec<String> {
         report.registration.method,
         report.read_from()
     ));
+    if let Some(fingerprint) = &report.fingerprint {
+        sentences.push(format!("The recipient: {}.", fingerprint.recipient.to_text("of the recipient")));
+        sentences
+            .push(format!("The key: {}, whoever the recipient is.", fingerprint.key.to_text("of the key")));
+        sentences.extend(probabilities(report));
+        sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
+        return sentences;
+    }
     let Some(message) = &report.message else {
         sentences.push(format!("Nothing was demodulated: {}.", report.reason));
         return sentences;
@@ -150,7 +158,10 @@ pub(crate) fn probabilities(report: &Report) -> Vec<String> {
                 "The message was not whitened, so numbers in sequence differ in few bits. A copy with any other message, \
                  also one that differs in a single bit,"
             }
-            _ => "A recipient of this key who has nothing to do with the copy, and so a random message,",
+            Some(Null::RandomMessage) => {
+                "A recipient of this key who has nothing to do with the copy, and so a random message,"
+            }
+            None => "A recipient who had no part in the copy, and so random signs,",
         };
         sentences.push(format!("{other} agrees so well with a probability of {}.", power_of_ten(p)));
     }
@@ -198,6 +209,11 @@ pub(crate) fn bound(report: &Report) -> Vec<String> {
         (Some(recipient), Some(message)) => format!(
             "The message {message} was computed again from the key and the recipient \"{}\": it is a keyed hash of \
              the two, and without the key nobody can choose it.",
+            clipped(recipient)
+        ),
+        (Some(recipient), None) => format!(
+            "The secret signs were computed again from the key and the recipient \"{}\": without the key nobody can \
+             make them.",
             clipped(recipient)
         ),
         (None, Some(message)) => format!(

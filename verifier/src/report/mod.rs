@@ -6,6 +6,7 @@ mod evidence;
 mod evidence_map;
 pub(crate) mod explain;
 mod extent;
+mod fingerprint;
 pub mod sketch;
 mod text;
 
@@ -14,10 +15,12 @@ pub use evidence::{Evidence, Provenance};
 pub use evidence_map::{EvidenceMap, FoundVertex, PatchEvidence};
 pub use explain::explain;
 pub use extent::Extent;
+pub use fingerprint::{FingerprintEntry, PatchAgreement, SignAgreement};
 
 use crate::ExitCode;
 use meshmark_core::{
     code::{Code, Decoder},
+    fingerprint_record::FingerprintShape,
     options::Parameters,
 };
 use meshmark_detection::{
@@ -50,8 +53,11 @@ pub struct Report {
     pub bits: Vec<f64>,
     /// Number of these bits that differ from those of the expected message.
     pub bit_errors: Option<usize>,
-    /// The decoding of the message.
-    pub code: CodeEntry,
+    /// The decoding of the message; null where the mark is a fingerprint.
+    pub code: Option<CodeEntry>,
+    /// The agreement of secret signs; null where the mark is a message, and where nothing was
+    /// observed.
+    pub fingerprint: Option<FingerprintEntry>,
     /// log₁₀ of the larger of the next two p-values, times the number of candidates.
     pub p_value_log10: Option<f64>,
     /// log₁₀ of the p-value of this much evidence under a random key.
@@ -140,6 +146,16 @@ pub struct VertexCounts {
     pub matched: usize,
 }
 
+/// The numbers that shape a mark, those of its version.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+pub enum MarkParameters {
+    /// Of a mark that carries a message.
+    Message(Parameters),
+    /// Of a fingerprint.
+    Fingerprint(FingerprintShape),
+}
+
 /// The assumed parameters of the mark, and those of the test.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the names are those of the options
@@ -148,7 +164,7 @@ pub struct ReportParameters {
     pub recipient: Option<String>,
     pub expected_message: Option<String>,
     #[serde(flatten)]
-    pub mark: Parameters,
+    pub mark: MarkParameters,
     pub layers: Option<Vec<String>>,
     pub crs: Option<String>,
     pub demodulator: &'static str,

@@ -28,6 +28,7 @@ impl Report {
                 None => "bits:         no better than guessed, for no mark of this key shows".into(),
             });
         }
+        lines.extend(self.fingerprint.iter().flat_map(|fingerprint| fingerprint.to_lines()));
         lines.extend(self.p_value_lines());
         let v = &self.vertices;
         lines.push(format!(
@@ -55,6 +56,9 @@ impl Report {
                 power_of_ten(mark),
                 power_of_ten(recipient)
             ));
+        }
+        if let (Some(p), Some(_)) = (self.p_value_log10, &self.fingerprint) {
+            lines.push(format!("p-value:      {}", power_of_ten(p)));
         }
         if let Some(p) = self.p_missed_log10 {
             lines.push(format!(
@@ -106,14 +110,14 @@ impl Report {
 
     /// Describes the LDPC decoding of a visible mark.
     pub(crate) fn decoding(&self) -> Option<String> {
-        let how = match self.code.decoder.filter(|_| self.shows_mark())? {
+        let code = self.code.filter(|_| self.shows_mark())?;
+        let how = match code.decoder? {
             Decoder::Sign => return None,
             Decoder::BeliefPropagation => "belief propagation, all parity checks hold",
             Decoder::OrderedStatistics => "ordered statistics, the most likely code word of those near",
         };
-        let of = self.code.name.channel_bits(self.bits.len()).expect("they were decoded");
-        let wrong =
-            self.code.channel_bit_errors.map(|wrong| format!("{wrong} of {of} code bits were wrong; "));
+        let of = code.name.channel_bits(self.bits.len()).expect("they were decoded");
+        let wrong = code.channel_bit_errors.map(|wrong| format!("{wrong} of {of} code bits were wrong; "));
         Some(format!("{}read by {how}", wrong.unwrap_or_default()))
     }
 
@@ -130,7 +134,15 @@ impl Report {
 
     /// Returns whether the suspect carries some mark of the key, whatever its message.
     pub(crate) fn shows_key(&self) -> bool {
-        shows_key(self.p_any_message_log10)
+        match &self.fingerprint {
+            Some(fingerprint) => fingerprint.shows_key(),
+            None => shows_key(self.p_any_message_log10),
+        }
+    }
+
+    /// Returns whether a copy was sought, and not a key alone.
+    pub(crate) fn is_of_somebody(&self) -> bool {
+        self.parameters.expected_message.is_some() || self.parameters.recipient.is_some()
     }
 
     pub(crate) fn verdict_name(&self) -> &'static str {

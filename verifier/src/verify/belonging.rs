@@ -2,14 +2,23 @@
 
 use super::request::Request;
 use crate::{Error, Result};
-use meshmark_core::{key::SecretKey, record::Record};
+use meshmark_core::{
+    fingerprint_record::FingerprintRecord, key::SecretKey, record::Record, recorded::Recorded,
+};
 use meshmark_dataset::Survey;
 
 /// Checks that the record is of this key, and that its message follows from key and recipient.
 ///
 /// # Errors
 /// Fails when the record is of another key, or was changed.
-pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
+pub fn check_key(record: &Recorded, key: &SecretKey) -> Result<()> {
+    match record {
+        Recorded::Message(record) => check_message(record, key),
+        Recorded::Fingerprint(record) => check_fingerprint(record, key),
+    }
+}
+
+fn check_message(record: &Record, key: &SecretKey) -> Result<()> {
     if record.key_id != key.id() {
         return Err(Error::OtherKey { made_with: record.key_id.clone(), given: key.id() });
     }
@@ -19,9 +28,20 @@ pub fn check_key(record: &Record, key: &SecretKey) -> Result<()> {
     Ok(())
 }
 
+fn check_fingerprint(record: &FingerprintRecord, key: &SecretKey) -> Result<()> {
+    if !record.is_of(key) {
+        return Err(Error::OtherCommitment { given: key.id() });
+    }
+    // All vertices of the map are in one part.
+    match record.parts.as_slice() {
+        [part] if part.sha256.to_string() == record.reference.vertices_sha256 => Ok(()),
+        parts => Err(Error::OtherParts { parts: parts.len() }),
+    }
+}
+
 /// Returns whether a record is of the reference whose vertices have this digest.
-pub fn is_made_from(record: &Record, digest: &str) -> bool {
-    record.reference.vertices_sha256 == digest
+pub fn is_made_from(record: &Recorded, digest: &str) -> bool {
+    record.vertices().1 == digest
 }
 
 /// Checks that the record is of this reference, whose vertices have this digest: any other has
@@ -29,13 +49,13 @@ pub fn is_made_from(record: &Record, digest: &str) -> bool {
 ///
 /// # Errors
 /// Fails when the record is of another reference.
-pub fn check_reference(record: &Record, request: &Request, reference: &Survey, digest: &str) -> Result<()> {
+pub fn check_reference(record: &Recorded, request: &Request, reference: &Survey, digest: &str) -> Result<()> {
     if is_made_from(record, digest) {
         return Ok(());
     }
     Err(Error::OtherReference {
         path: request.reference.clone(),
-        recorded: record.reference.vertices,
+        recorded: record.vertices().0,
         vertices: reference.data.vertices.len(),
     })
 }

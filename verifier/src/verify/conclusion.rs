@@ -1,24 +1,32 @@
 //! The conclusion: a report on examination and decision, including all that needs the secret key.
 
-use super::{examination::Examination, request::Request};
-use crate::report::{Certainty, CodeEntry, Evidence, Report, ReportParameters};
-use meshmark_core::{carrier::Carrier, demodulation::Demodulation, message::Message};
+use super::{
+    evidence::{FingerprintEvidence, Found, MessageEvidence},
+    examination::Examination,
+    request::{Request, Sought},
+};
+use crate::report::{
+    Certainty, CodeEntry, Evidence, FingerprintEntry, MarkParameters, PatchAgreement, Report,
+    ReportParameters,
+};
+use meshmark_core::{carrier::Carrier, fingerprint_record::FingerprintShape, message::Message};
 use meshmark_detection::{
     Demodulator,
-    decision::{Decision, Decoys, p_any_message_log10},
+    decision::{Decision, Decoys, Verdict, p_any_message_log10, recipients::p_log10},
 };
 use std::collections::BTreeMap;
 
-/// Creates the report on an examination and the decision.
+/// Creates the report on an examination for a message and the decision.
 pub fn conclude(
     request: &Request,
     seen: &Examination,
     decision: Decision,
     seconds: &BTreeMap<&'static str, f64>,
 ) -> Report {
-    let (found, hypothesis) = (seen.found.as_ref().ok(), request.expected());
+    let (evidence, hypothesis) = (seen.message(), request.expected());
+    let found = evidence.map(|evidence| &evidence.demodulation);
     let expected = hypothesis.as_ref().map(|hypothesis| &hypothesis.carried);
-    let decoded = found.map(Demodulation::decode);
+    let decoded = found.map(|found| found.decode());
     let carried = decoded.as_ref().map(|decoded| &decoded.message);
     let read = |carried: &Message| match &request.subject {
         Some(subject) => subject.message_of(carried, &request.key),
@@ -36,19 +44,14 @@ pub fn conclude(
         let carrier = Carrier::new(&request.key);
         tested.map(|(found, expected)| found.patch_scores(&carrier, expected, patches)).unwrap_or_default()
     };
-    let sketch = seen.sketch.clone();
-    let evidence_map = seen.evidence_map.clone();
+    let decoys = evidence.and_then(|MessageEvidence { decoys, .. }| decoys.clone());
     Report {
-        meshmark_report: 1,
-        verdict: decision.verdict,
         p_value_log10: decision.p_value_log10(),
         p_mark_log10: decision.p_mark_log10,
         p_recipient_log10: decision.p_recipient_log10,
         p_missed_log10: decision.p_missed_log10,
         p_any_message_log10: found.and_then(|f| p_any_message_log10(f, request.parameters.chip_rate)),
-        candidates: None,
-        decoys: seen.decoys.clone().map(|decoys| Decoys { tested, ..decoys }),
-        reason: decision.reason,
+        decoys: decoys.map(|decoys| Decoys { tested, ..decoys }),
         message: carried.map(|carried| read(carried).to_hex()),
         carried_message: carried.map(Message::to_hex),
         unwhitened_message: carried.map(|carried| request.key.unwhitened(carried).to_hex()),
@@ -58,13 +61,86 @@ pub fn conclude(
         bit_errors: decoded.as_ref().zip(expected).map(|(decoded, m)| decoded.message.errors(m)),
         certainty: decoded.as_ref().and_then(|decoded| certainty(&decoded.message_llrs)),
         bits: decoded.map(|decoded| decoded.message_llrs).unwrap_or_default(),
-        code,
+        code: Some(code),
+        ..report(request, seen, (decision.verdict, decision.reason), seconds, &patch_scores)
+    }
+}
+
+/// Creates the report on an examination for fingerprints, on the recipient of this number, who is the
+/// subject of the request.
+pub fn conclude_fingerprint(
+    request: &Request,
+    seen: &Examination,
+    number: usize,
+    seconds: &BTreeMap<&'static str, f64>,
+) -> Report {
+    let found = match &seen.found {
+        Ok(Found::Fingerprint(found)) => found,
+        Ok(Found::Message(_)) => unreachable!("a fingerprint is sought"),
+        Err(reason) => {
+            let answer = (Verdict::Inconclusive, reason.clone());
+            return report(request, seen, answer, seconds, &|_| Vec::new());
+        }
+    };
+    let FingerprintEvidence { recipients, pilots, .. } = found;
+    let Some((standing, answer)) = recipients.get(number) else {
+        let Decision { verdict, reason, .. } = Decision::without_message();
+        return report(request, seen, (verdict, reason), seconds, &|_| Vec::new());
+    };
+    let recipient = request.recipient().expect("a fingerprint is that of a recipient");
+    let scores = found.patch_scores(&request.key, recipient);
+    let fingerprint = FingerprintEntry {
+        recipient: standing.agreement.into(),
+        key: (*pilots).into(),
+        patches: PatchAgreement::of(&scores),
+    };
+    Report {
+        p_value_log10: Some(standing.p_value_log10),
+        p_recipient_log10: Some(p_log10(standing.score).min(0.0)),
+        p_missed_log10: answer.p_missed_log10,
+        fingerprint: Some(fingerprint),
+        ..report(request, seen, (answer.verdict, answer.reason.clone()), seconds, &|_| scores.clone())
+    }
+}
+
+/// Creates a report without what depends on the version of the mark. `patch_scores` returns the
+/// score of each of so many patches, or nothing.
+fn report(
+    request: &Request,
+    seen: &Examination,
+    (verdict, reason): (Verdict, String),
+    seconds: &BTreeMap<&'static str, f64>,
+    patch_scores: &dyn Fn(usize) -> Vec<Option<f64>>,
+) -> Report {
+    let (sketch, evidence_map) = (seen.sketch.clone(), seen.evidence_map.clone());
+    Report {
+        meshmark_report: 1,
+        verdict,
+        reason,
+        message: None,
+        carried_message: None,
+        unwhitened_message: None,
+        bits: Vec::new(),
+        bit_errors: None,
+        code: None,
+        fingerprint: None,
+        p_value_log10: None,
+        p_mark_log10: None,
+        p_recipient_log10: None,
+        p_missed_log10: None,
+        null_hypothesis: None,
+        p_any_message_log10: None,
+        candidates: None,
+        decoys: None,
         registration: seen.registration.clone(),
         vertices: seen.vertices,
         parameters: report_parameters(request, seen),
         seconds: Some(seconds.clone()),
         provenance: None,
         evidence: sketch.map(|sketch| Evidence { patch_scores: patch_scores(sketch.patches.len()), sketch }),
+        tried: 1,
+        certainty: None,
+        expected_carried: None,
         reference: request.reference.clone(),
         reference_digest: seen.reference_digest.clone(),
         suspect_crs: seen.suspect_crs.clone(),
@@ -87,11 +163,25 @@ fn certainty(llrs: &[f64]) -> Option<Certainty> {
 }
 
 fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters {
+    let (mark, expected_message) = match &request.sought {
+        Sought::Message { .. } => (
+            MarkParameters::Message(request.parameters.clone()),
+            request.subject.as_ref().map(|subject| subject.message(&request.key).to_hex()),
+        ),
+        Sought::Fingerprint { coefficients, .. } => {
+            (MarkParameters::Fingerprint(FingerprintShape::new(*coefficients, &request.parameters)), None)
+        }
+    };
+    let noise_m = match seen.found.as_ref().ok() {
+        Some(Found::Message(evidence)) => Some(evidence.demodulation.noise_m),
+        Some(Found::Fingerprint(evidence)) => Some(evidence.noise_m),
+        None => None,
+    };
     ReportParameters {
         key_id: request.key.id(),
         recipient: request.recipient().map(String::from),
-        expected_message: request.subject.as_ref().map(|s| s.message(&request.key).to_hex()),
-        mark: request.parameters.clone(),
+        expected_message,
+        mark,
         layers: request.layers.clone(),
         crs: seen.crs.clone(),
         demodulator: match request.demodulator {
@@ -102,7 +192,7 @@ fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters 
         radius_reason: seen.radius.reason,
         observations: seen.observations,
         significance: request.significance,
-        noise_m: seen.found.as_ref().ok().map(|found| found.noise_m),
+        noise_m,
         software: format!("meshmark {}", env!("CARGO_PKG_VERSION")),
     }
 }

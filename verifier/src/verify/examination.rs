@@ -1,9 +1,10 @@
-//! The examination of a suspect: registration, matching, demodulation. No message is involved.
+//! The examination of a suspect: registration, matching, evidence.
 
 use super::{
     crs_search::{self, Registered},
     drawing,
-    request::Request,
+    evidence::{self, FingerprintEvidence, Found, MessageEvidence, Surroundings},
+    request::{Request, Sought},
 };
 use crate::{
     Error, Result,
@@ -14,18 +15,16 @@ use crate::{
     progress::Progress,
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
-use meshmark_core::demodulation::Demodulation;
 use meshmark_dataset::{CoordinateSystem, Survey};
 use meshmark_detection::{
-    Demodulated, Matched, Observations, Reference,
-    decision::{Decision, Decoys, Expected, decide_among},
+    Matched, Observations, Reference,
+    decision::{Decision, Expected, decide_among},
     maps_of_features,
     matching::{LEAST_MATCHED, Radius},
-    power::Power,
     registration::{Registrar, Registration, Start},
 };
 
-/// The evidence of a suspect before the comparison with a message.
+/// The evidence of a suspect.
 pub struct Examination {
     /// The registration of the suspect.
     pub registration: Registration,
@@ -39,14 +38,10 @@ pub struct Examination {
     pub suspect_crs: Vec<String>,
     /// The matching radius.
     pub radius: Radius,
-    /// The demodulated evidence, or the reason why there is none.
-    pub found: std::result::Result<Demodulation, String>,
-    /// What the displacements were observed on, where something was demodulated.
+    /// The evidence about the mark, or the reason why there is none.
+    pub found: std::result::Result<Found, String>,
+    /// What the displacements were observed on, where there is evidence.
     pub observations: Option<Observations>,
-    /// What a present mark would show, where something was demodulated.
-    pub power: Option<Power>,
-    /// Scores of decoy keys.
-    pub decoys: Option<Decoys>,
     /// The drawing data of a report file, if requested.
     pub sketch: Option<Sketch>,
     /// The evidence map, if requested.
@@ -77,12 +72,30 @@ pub enum Suited<T> {
 }
 
 impl Examination {
+    /// Returns the evidence about a message, if one is sought and there is any.
+    pub fn message(&self) -> Option<&MessageEvidence> {
+        match &self.found {
+            Ok(Found::Message(evidence)) => Some(evidence),
+            _ => None,
+        }
+    }
+
+    /// Returns the evidence about a fingerprint, if one is sought and there is any.
+    pub fn fingerprint(&self) -> Option<&FingerprintEvidence> {
+        match &self.found {
+            Ok(Found::Fingerprint(evidence)) => Some(evidence),
+            _ => None,
+        }
+    }
+
     /// Decides on an expected message, one of the `tried`.
     pub fn decide(&self, expected: &Expected, tried: usize, significance: f64) -> Decision {
-        match (&self.found, self.power) {
-            (Ok(found), Some(power)) => decide_among(found, power, expected, tried, significance),
-            (Err(reason), _) => Decision::inconclusive(reason.clone()),
-            (Ok(_), None) => unreachable!("power is measured for all that is demodulated"),
+        match &self.found {
+            Ok(Found::Message(MessageEvidence { demodulation, power, .. })) => {
+                decide_among(demodulation, *power, expected, tried, significance)
+            }
+            Ok(Found::Fingerprint(_)) => unreachable!("a message is sought"),
+            Err(reason) => Decision::inconclusive(reason.clone()),
         }
     }
 }
@@ -100,7 +113,7 @@ impl<T> Suited<T> {
     }
 }
 
-/// Registers, matches and demodulates the suspect of a request.
+/// Registers and matches the suspect of a request, and collects the evidence about its mark.
 ///
 /// # Errors
 /// Fails when the suspect is unreadable.
@@ -118,7 +131,14 @@ pub fn examine(
     let suspect = read_suspect(request, reference, progress)?;
     let suspect_crs = suspect.layer_crs.clone();
     progress.start("patches", 0);
-    let compared = match Reference::new(&reference.data, &map, request.bits, &request.parameters) {
+    let (data, parameters) = (&reference.data, &request.parameters);
+    let compared = match &request.sought {
+        Sought::Message { bits } => Reference::new(data, &map, *bits, parameters),
+        Sought::Fingerprint { coefficients, .. } => {
+            Reference::for_fingerprints(data, &map, *coefficients, parameters)
+        }
+    };
+    let compared = match compared {
         Ok(compared) => compared,
         Err(error) => return Ok(unfit(error.into())), // this comes before the search for the map
     };
@@ -126,12 +146,12 @@ pub fn examine(
         register(request, (reference, &compared), suspect, progress)?;
     progress.start("matching", 0);
     let matched = Matched::new(&compared, &suspect.data, &registration, request.radius);
-    let demodulated = match demodulate(request, &matched, progress) {
-        Ok(demodulated) => demodulated,
+    let evidence = match evidence::collect(request, &matched, progress) {
+        Ok(evidence) => evidence,
         Err(error) => return Ok(unfit(error.into())),
     };
     let crs = reference.crs.as_ref();
-    Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
+    Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, evidence), registration, crs) }))
 }
 
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
@@ -171,46 +191,30 @@ fn register(
     Ok(best)
 }
 
-/// Demodulates what matches, and measures what a present mark would show; nothing where matches are
-/// chance.
-fn demodulate(
-    request: &Request,
-    matched: &Matched,
-    progress: &mut Progress,
-) -> meshmark_core::Result<Option<(Demodulated, Power)>> {
-    let (mark, demodulator) = (request.mark(), request.demodulator);
-    if matched.is_chance(demodulator) {
-        return Ok(None);
-    }
-    let found = progress.listen(|listener| matched.demodulate(mark, demodulator, listener))?;
-    let power = progress.listen(|listener| Power::measure(matched, &found, mark, demodulator, listener))?;
-    Ok(Some((found, power)))
-}
-
 /// Returns the examination of a suspect that was matched. `crs` is that of the reference.
 fn seen(
     request: &Request,
-    (matched, demodulated): (&Matched, Option<(Demodulated, Power)>),
+    (matched, evidence): (&Matched, Option<(Found, Surroundings)>),
     registration: Registration,
     crs: Option<&CoordinateSystem>,
 ) -> Examination {
-    let (demodulated, power) = demodulated.unzip();
+    let (found, around) = evidence.unzip();
+    let around = around.as_ref();
     // A CRS is only found where the suspect is.
-    let read_as = registration.read_as.clone().filter(|_| demodulated.is_some());
+    let read_as = registration.read_as.clone().filter(|_| found.is_some());
     let registration = Registration { read_as, ..registration };
-    let matches = demodulated.as_ref().map_or(&matched.matches, |demodulated| &demodulated.matches);
-    let radius = demodulated.as_ref().map_or(matched.radius, |demodulated| demodulated.radius);
+    let matches = around.map_or(&matched.matches, |around| &around.matches);
+    let radius = around.map_or(matched.radius, |around| around.radius);
     let reference = &matched.reference.data.vertices;
     let suspect = matched.suspect.vertices.len();
     let vertices = VertexCounts { reference: reference.len(), suspect, matched: matches.count };
-    let scene = drawing::Scene { matched, matches, demodulated: demodulated.as_ref() };
+    let deformation = around.and_then(|around| around.deformation);
+    let weights = around.map_or(&[][..], |around| &around.weights);
+    let scene = drawing::Scene { matched, matches, deformation, weights };
     let sketch = request.sketch.then(|| drawing::sketch(&scene, &registration));
     let evidence_map = request.evidence_map.then(|| drawing::evidence_map(&scene, crs));
-    let observations = demodulated.as_ref().map(|demodulated| demodulated.observations);
-    let (found, decoys) = match demodulated {
-        Some(Demodulated { found, decoys, .. }) => (Ok(found), decoys),
-        None => (Err(unregistered(&vertices, matched.by_chance, request.registration)), None),
-    };
+    let observations = around.map(|around| around.observations);
+    let found = found.ok_or_else(|| unregistered(&vertices, matched.by_chance, request.registration));
     Examination {
         registration,
         vertices,
@@ -220,8 +224,6 @@ fn seen(
         radius,
         found,
         observations,
-        power,
-        decoys,
         sketch,
         evidence_map,
     }

@@ -11,18 +11,20 @@ mod belonging;
 mod conclusion;
 mod crs_search;
 mod drawing;
+mod evidence;
 mod examination;
 mod records;
 mod references;
 mod request;
 
 pub use belonging::{check_key, check_reference};
+pub use evidence::{FingerprintEvidence, Found, MessageEvidence};
 pub use examination::{Examination, Suited, examine, read_reference};
 pub use records::verify_records;
-pub use request::Request;
+pub use request::{Request, Sought};
 
 use crate::{Result, progress::Progress, report::Report};
-use conclusion::conclude;
+use conclusion::{conclude, conclude_fingerprint};
 use meshmark_core::options::Subject;
 use meshmark_detection::decision::{Decision, Expected};
 use references::read_own_reference;
@@ -37,6 +39,9 @@ use std::path::PathBuf;
 pub fn verify(request: &Request, references: &[PathBuf], progress: &mut Progress) -> Result<Report> {
     let (request, reference) = read_own_reference(request, references, progress)?;
     let seen = examine(&request, &reference, progress)?.or_fail()?;
+    if matches!(request.sought, Sought::Fingerprint { .. }) {
+        return Ok(conclude_fingerprint(&request, &seen, 0, progress.finish()));
+    }
     let (subject, decision) = decide_subjects(&request, &seen);
     let request = Request { subject, ..request };
     Ok(conclude(&request, &seen, decision, progress.finish()))

@@ -1,13 +1,14 @@
 //! Verification against many records: finds the recipient of a copy.
 //!
-//! Records with equal settings expect marks that differ only in the message, so the suspect is
-//! registered, matched and demodulated once for all of them.
+//! Records with equal settings expect marks that differ only in the message or recipient, so the
+//! suspect is examined once for all of them. Records of both versions of the mark count together.
 
 use super::{
     belonging::{check_key, is_made_from},
-    conclusion::conclude,
+    conclusion::{conclude, conclude_fingerprint},
+    evidence::Found,
     examination::{Examination, Suited, examine, read_reference},
-    request::Request,
+    request::{Request, Sought},
 };
 use crate::{
     Error, Result,
@@ -16,8 +17,12 @@ use crate::{
     report::{Candidates, Entry, Report},
 };
 use meshmark_core::{
-    demodulation::Demodulation, key::SecretKey, message::Message, options::Subject, record::Record,
+    key::SecretKey,
+    message::Message,
+    options::{Options, Subject},
+    recorded::Recorded,
 };
+use meshmark_dataset::Survey;
 use meshmark_detection::decision::{Decision, Expected, Verdict};
 use std::path::{Path, PathBuf};
 
@@ -27,10 +32,11 @@ const MOST_LISTED: usize = 20;
 /// A record of the folder.
 struct Candidate {
     file: String,
-    record: Record,
-    subject: Subject,
-    /// The message in the record.
-    message: Message,
+    record: Recorded,
+    /// The options in the record.
+    options: Options,
+    /// The message in the record; none of a fingerprint.
+    message: Option<Message>,
 }
 
 /// Candidates with equal settings.
@@ -41,10 +47,21 @@ struct Group {
 
 /// The outcome of one candidate.
 struct Outcome {
-    group: usize,
+    /// The numbers of its group, and of the candidate in the group.
+    place: [usize; 2],
     candidate: Candidate,
-    decision: Decision,
+    answer: Answered,
     bit_errors: Option<usize>,
+}
+
+/// The answer about a candidate.
+struct Answered {
+    verdict: Verdict,
+    reason: String,
+    p_value_log10: Option<f64>,
+    p_missed_log10: Option<f64>,
+    /// The decision on a message.
+    decision: Option<Decision>,
 }
 
 /// Verifies one suspect against every record (*.json) of a folder, each with the one of
@@ -66,30 +83,43 @@ pub fn verify_records(
         None => skipped.push((reason, vec![file.into()])),
     };
     let groups = groups(request, read_all(folder, &request.key, &mut skip)?);
+    let mut of_references = Vec::new();
+    for group in groups {
+        of_references.extend(group_by_reference(group, references, progress, &mut skip)?);
+    }
+    let tried = of_references.iter().map(|(group, _)| group.candidates.len()).sum();
     let mut examined: Vec<(Request, Examination)> = Vec::new();
     let mut of_group = Vec::new();
-    for group in groups {
-        for (group, seen) in examine_group(group, references, progress, &mut skip)? {
-            of_group.push(group.candidates);
-            examined.push((group.request, seen));
+    for (group, reference) in of_references {
+        let request = group.request(tried);
+        match examine(&request, &reference, progress)? {
+            Suited::Yes(seen) => {
+                of_group.push(group.candidates);
+                examined.push((request, seen));
+            }
+            Suited::No(error) => skip_all(&group, &error.to_string(), &mut skip),
         }
     }
     let left_out = skipped.iter().map(|(_, files)| files.len()).sum();
     for (reason, files) in &skipped {
         warn(&format!("{} skipped: {reason}", folder.join(these_are(files)).display()));
     }
-    let outcomes = decide_all(of_group, &examined, request.significance);
+    let outcomes = decide_all(of_group, &examined, tried, request.significance);
     let Some(best) = outcomes.first() else {
         return Err(Error::NoRecord { folder: folder.into() });
     };
-    let (template, seen) = &examined[best.group];
+    let (template, seen) = &examined[best.place[0]];
     let chosen = Request {
         record: Some(best.candidate.record.clone()),
-        subject: Some(best.candidate.subject.clone()),
+        subject: best.candidate.options.subject.clone(),
         ..template.clone()
     };
-    let report = conclude(&chosen, seen, overall(&outcomes), progress.finish());
-    Ok(Report { candidates: Some(listed(&outcomes, left_out)), ..report })
+    let report = match &best.answer.decision {
+        Some(decision) => conclude(&chosen, seen, decision.clone(), progress.finish()),
+        None => conclude_fingerprint(&chosen, seen, best.place[1], progress.finish()),
+    };
+    let Overall { verdict, reason, p_missed_log10 } = overall(&outcomes);
+    Ok(Report { verdict, reason, p_missed_log10, candidates: Some(listed(&outcomes, left_out)), ..report })
 }
 
 /// Names files with a verb: "a.json is", "a.json, b.json and 31 more are".
@@ -128,47 +158,77 @@ fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) 
 }
 
 /// Creates the candidate of a record that belongs to the key.
-fn candidate(file: String, record: Record, key: &SecretKey) -> Result<Candidate> {
+fn candidate(file: String, record: Recorded, key: &SecretKey) -> Result<Candidate> {
     check_key(&record, key)?;
-    let (subject, message) = (record.subject()?, record.message()?);
-    Ok(Candidate { file, record, subject, message })
+    let message = match &record {
+        Recorded::Message(record) => Some(record.message()?),
+        Recorded::Fingerprint(_) => None,
+    };
+    let options = record.options()?;
+    Ok(Candidate { file, record, options, message })
 }
 
-/// Groups records that differ only in their message.
+impl Candidate {
+    /// Returns what the mark carries, without naming a recipient.
+    fn sought(&self) -> Sought {
+        match (self.options.coefficients, &self.message) {
+            (Some(coefficients), _) => Sought::Fingerprint { coefficients, recipients: Vec::new(), tried: 0 },
+            (None, message) => Sought::Message { bits: message.as_ref().map_or(0, Message::len) },
+        }
+    }
+
+    fn recipient(&self) -> Option<String> {
+        self.options.subject.as_ref().and_then(Subject::recipient).map(String::from)
+    }
+}
+
+impl Group {
+    /// Returns the request for all candidates of the group, among all that are `tried`.
+    fn request(&self, tried: usize) -> Request {
+        let sought = match &self.request.sought {
+            Sought::Fingerprint { coefficients, .. } => {
+                let recipients = self.candidates.iter().filter_map(Candidate::recipient).collect();
+                Sought::Fingerprint { coefficients: *coefficients, recipients, tried }
+            }
+            message => message.clone(),
+        };
+        Request { sought, ..self.request.clone() }
+    }
+}
+
+/// Groups records that differ only in their message or recipient.
 fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
-        let (record, bits) = (&candidate.record, candidate.message.len());
-        let parameters = &record.parameters;
+        let (sought, Options { parameters, layers, srs, .. }) = (candidate.sought(), &candidate.options);
         let same = |group: &&mut Group| {
             let r = &group.request;
-            r.parameters == *parameters && r.layers == record.layers && r.srs == record.srs && r.bits == bits
+            r.parameters == *parameters && r.layers == *layers && r.srs == *srs && r.sought.is_like(&sought)
         };
         if let Some(group) = groups.iter_mut().find(same) {
             group.candidates.push(candidate);
             continue;
         }
-        let (layers, srs) = (record.layers.clone(), record.srs.clone());
-        let parameters = parameters.clone();
-        let request = Request { parameters, layers, srs, bits, ..request.clone() };
+        let (parameters, layers, srs) = (parameters.clone(), layers.clone(), srs.clone());
+        let request = Request { parameters, layers, srs, sought, ..request.clone() };
         groups.push(Group { request, candidates: vec![candidate] });
     }
     groups
 }
 
-/// Demodulates the suspect for the records of a group, for each reference those that were made from
-/// it. Records of no reference are skipped.
-fn examine_group(
+/// Divides the records of a group among the references that they were made from. Records of no
+/// reference are skipped.
+fn group_by_reference(
     mut group: Group,
     references: &[PathBuf],
     progress: &mut Progress,
     skip: &mut dyn FnMut(&str, String),
-) -> Result<Vec<(Group, Examination)>> {
-    let mut examined = Vec::new();
+) -> Result<Vec<(Group, Survey)>> {
+    let mut divided = Vec::new();
     let mut other = None;
     for path in references {
         if group.candidates.is_empty() {
-            return Ok(examined);
+            return Ok(divided);
         }
         let request = Request { reference: path.clone(), ..group.request.clone() };
         let reference = match read_reference(&request, progress)? {
@@ -182,12 +242,8 @@ fn examine_group(
         let (own, rest) = group.candidates.into_iter().partition(|c| is_made_from(&c.record, &digest));
         group.candidates = rest;
         let own = Group { request, candidates: own };
-        if own.candidates.is_empty() {
-            continue;
-        }
-        match examine(&own.request, &reference, progress)? {
-            Suited::Yes(seen) => examined.push((own, seen)),
-            Suited::No(error) => skip_all(&own, &error.to_string(), skip),
+        if !own.candidates.is_empty() {
+            divided.push((own, reference));
         }
     }
     let reason = match (references, other) {
@@ -201,7 +257,7 @@ fn examine_group(
         ),
     };
     skip_all(&group, &reason, skip);
-    Ok(examined)
+    Ok(divided)
 }
 
 /// Skips all records of a group.
@@ -209,30 +265,39 @@ fn skip_all(group: &Group, reason: &str, skip: &mut dyn FnMut(&str, String)) {
     group.candidates.iter().for_each(|candidate| skip(&candidate.file, reason.into()));
 }
 
-/// Decides on every candidate; the best one comes first.
+/// Returns the answer about every candidate; the best one comes first.
 fn decide_all(
     of_group: Vec<Vec<Candidate>>,
     examined: &[(Request, Examination)],
+    tried: usize,
     significance: f64,
 ) -> Vec<Outcome> {
-    let tried = of_group.iter().map(Vec::len).sum();
-    let found = |group: usize| examined[group].1.found.as_ref();
-    let messages: Vec<_> =
-        (0..examined.len()).map(|group| found(group).ok().map(Demodulation::message)).collect();
-    let decide = |(group, candidate): (usize, Candidate)| {
-        let expected = Expected::new(&candidate.subject, &examined[group].0.key);
-        let decision = examined[group].1.decide(&expected, tried, significance);
-        let bit_errors = messages[group].as_ref().map(|message| message.errors(&expected.carried));
-        Outcome { group, candidate, decision, bit_errors }
+    let message = |group: usize| examined[group].1.message().map(|found| found.demodulation.message());
+    let messages: Vec<_> = (0..examined.len()).map(message).collect();
+    let decide = |(place, candidate): ([usize; 2], Candidate)| {
+        let (group, number) = (place[0], place[1]);
+        let (request, seen) = &examined[group];
+        let expected = |_: &Message| {
+            let subject = candidate.options.subject.as_ref().expect("a record has one");
+            Expected::new(subject, &request.key)
+        };
+        let expected = candidate.message.as_ref().map(expected);
+        let answer = match &expected {
+            Some(expected) => Answered::of_message(seen.decide(expected, tried, significance)),
+            None => Answered::of_fingerprint(seen, number),
+        };
+        let bit_errors =
+            messages[group].as_ref().zip(expected).map(|(m, expected)| m.errors(&expected.carried));
+        Outcome { place, candidate, answer, bit_errors }
     };
-    let all = of_group
-        .into_iter()
-        .enumerate()
-        .flat_map(|(g, candidates)| candidates.into_iter().map(move |c| (g, c)));
+    let numbered = |(group, candidates): (usize, Vec<Candidate>)| {
+        candidates.into_iter().enumerate().map(move |(number, candidate)| ([group, number], candidate))
+    };
+    let all = of_group.into_iter().enumerate().flat_map(numbered);
     let mut outcomes: Vec<Outcome> = all.map(decide).collect();
     let rank = |outcome: &Outcome| {
-        let p = outcome.decision.p_value_log10().unwrap_or(f64::INFINITY);
-        (outcome.decision.verdict != Verdict::Match, p)
+        let p = outcome.answer.p_value_log10.unwrap_or(f64::INFINITY);
+        (outcome.answer.verdict != Verdict::Match, p)
     };
     outcomes.sort_by(|a, b| {
         let ((a_other, a_p), (b_other, b_p)) = (rank(a), rank(b));
@@ -246,27 +311,68 @@ fn decide_all(
     outcomes
 }
 
-/// Returns the decision on all candidates, with the grounds of the best one.
-fn overall(outcomes: &[Outcome]) -> Decision {
-    let matches = count_matches(outcomes);
-    let mut best = outcomes[0].decision.clone();
-    if matches == 0 {
-        best.p_missed_log10 = outcomes.iter().filter_map(|o| o.decision.p_missed_log10).reduce(f64::max);
-    }
-    let unclear = outcomes.iter().find(|o| o.decision.verdict == Verdict::Inconclusive);
-    match (matches, unclear) {
-        (0, Some(unclear)) => {
-            let reason = unclear.decision.reason.clone();
-            Decision { verdict: Verdict::Inconclusive, reason, ..best }
+impl Answered {
+    fn of_message(decision: Decision) -> Self {
+        Answered {
+            verdict: decision.verdict,
+            reason: decision.reason.clone(),
+            p_value_log10: decision.p_value_log10(),
+            p_missed_log10: decision.p_missed_log10,
+            decision: Some(decision),
         }
-        (0, None) => Decision {
+    }
+
+    /// Returns the answer about the fingerprint of this number in an examination.
+    fn of_fingerprint(seen: &Examination, number: usize) -> Self {
+        match &seen.found {
+            Ok(Found::Fingerprint(found)) => {
+                let (standing, answer) = &found.recipients[number];
+                Answered {
+                    verdict: answer.verdict,
+                    reason: answer.reason.clone(),
+                    p_value_log10: Some(standing.p_value_log10),
+                    p_missed_log10: answer.p_missed_log10,
+                    decision: None,
+                }
+            }
+            Ok(Found::Message(_)) => unreachable!("a fingerprint is sought"),
+            Err(reason) => {
+                let (verdict, reason) = (Verdict::Inconclusive, reason.clone());
+                Answered { verdict, reason, p_value_log10: None, p_missed_log10: None, decision: None }
+            }
+        }
+    }
+}
+
+/// The answer about all candidates.
+struct Overall {
+    verdict: Verdict,
+    reason: String,
+    p_missed_log10: Option<f64>,
+}
+
+/// Returns the answer about all candidates, with the grounds of the best one.
+fn overall(outcomes: &[Outcome]) -> Overall {
+    let matches = count_matches(outcomes);
+    let Answered { verdict, reason, p_missed_log10, .. } = &outcomes[0].answer;
+    let best = Overall { verdict: *verdict, reason: reason.clone(), p_missed_log10: *p_missed_log10 };
+    let missed = || outcomes.iter().filter_map(|o| o.answer.p_missed_log10).reduce(f64::max);
+    let unclear = outcomes.iter().find(|o| o.answer.verdict == Verdict::Inconclusive);
+    match (matches, unclear) {
+        (0, Some(unclear)) => Overall {
+            verdict: Verdict::Inconclusive,
+            reason: unclear.answer.reason.clone(),
+            p_missed_log10: missed(),
+        },
+        (0, None) => Overall {
             reason: "a mark with this key, this reference and the message and options of any of these records would \
                      have shown, and none does"
                 .into(),
+            p_missed_log10: missed(),
             ..best
         },
         (1, _) => best,
-        _ => Decision {
+        _ => Overall {
             reason: format!(
                 "for {matches} of the records the probability that key and message fit so well by chance is below the \
                  significance"
@@ -277,16 +383,16 @@ fn overall(outcomes: &[Outcome]) -> Decision {
 }
 
 fn count_matches(outcomes: &[Outcome]) -> usize {
-    outcomes.iter().filter(|o| o.decision.verdict == Verdict::Match).count()
+    outcomes.iter().filter(|o| o.answer.verdict == Verdict::Match).count()
 }
 
 fn listed(outcomes: &[Outcome], skipped: usize) -> Candidates {
     let matches = count_matches(outcomes);
     let entry = |outcome: &Outcome| Entry {
         record: outcome.candidate.file.clone(),
-        recipient: outcome.candidate.record.recipient.clone(),
-        message: outcome.candidate.message.to_hex(),
-        p_value_log10: outcome.decision.p_value_log10(),
+        recipient: outcome.candidate.recipient(),
+        message: outcome.candidate.message.as_ref().map(Message::to_hex),
+        p_value_log10: outcome.answer.p_value_log10,
         bit_errors: outcome.bit_errors,
     };
     let list = outcomes.iter().take(MOST_LISTED.max(matches)).map(entry).collect();

@@ -3,13 +3,45 @@
 use meshmark_core::{
     key::SecretKey,
     options::{Parameters, Subject},
-    record::Record,
+    recorded::Recorded,
 };
 use meshmark_dataset::LabelFields;
 use meshmark_detection::{
     Demodulator, Mark, decision::Expected, matching::RadiusChoice, registration::Start,
 };
 use std::path::PathBuf;
+
+/// What a mark carries.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Sought {
+    /// A message.
+    Message {
+        /// Its length.
+        bits: usize,
+    },
+    /// The fingerprint of a recipient.
+    Fingerprint {
+        /// Coefficients of a patch and axis that carry it.
+        coefficients: usize,
+        /// The possible recipients.
+        recipients: Vec<String>,
+        /// Number of these, and of those whose marks have other numbers or another reference.
+        tried: usize,
+    },
+}
+
+impl Sought {
+    /// Returns whether one examination serves for both.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Sought::Message { bits: a }, Sought::Message { bits: b }) => a == b,
+            (Sought::Fingerprint { coefficients: a, .. }, Sought::Fingerprint { coefficients: b, .. }) => {
+                a == b
+            }
+            _ => false,
+        }
+    }
+}
 
 /// The inputs and settings of a verification.
 #[derive(Clone)]
@@ -21,11 +53,11 @@ pub struct Request {
     /// The suspect map.
     pub suspect: PathBuf,
     /// The record that the driver wrote when it marked the map.
-    pub record: Option<Record>,
+    pub record: Option<Recorded>,
     /// The expected subject of the mark, if it is known.
     pub subject: Option<Subject>,
-    /// Length of the message, bits.
-    pub bits: usize,
+    /// What the mark carries.
+    pub sought: Sought,
     /// The parameters of the mark.
     pub parameters: Parameters,
     /// Layers that were marked; all when `None`.
@@ -60,9 +92,9 @@ impl Request {
         self.subject.as_ref().and_then(Subject::recipient)
     }
 
-    /// Returns the properties of the mark.
-    pub(super) fn mark(&self) -> Mark<'_> {
-        Mark { key: &self.key, bits: self.bits, parameters: &self.parameters }
+    /// Returns the properties of a mark that carries a message of this length.
+    pub(super) fn mark(&self, bits: usize) -> Mark<'_> {
+        Mark { key: &self.key, bits, parameters: &self.parameters }
     }
 
     /// Returns the possible subjects of the mark. Without a record, a message may precede the

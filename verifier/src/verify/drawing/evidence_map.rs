@@ -23,8 +23,7 @@ pub fn evidence_map(scene: &Scene, crs: Option<&CoordinateSystem>) -> EvidenceMa
     let patches = patches.iter().map(of_patch).collect();
     let mut map = EvidenceMap { crs: crs.cloned(), vertices: Vec::new(), patches };
     let moved_m = scene.displacements_m();
-    let weights = scene.demodulated.iter().flat_map(|demodulated| &demodulated.weights);
-    for (v, &weight) in weights.enumerate() {
+    for (v, &weight) in scene.weights.iter().enumerate() {
         let (Some(moved_m), at) = (moved_m[v], coords[v]) else { continue };
         let unit = ground.metres_per_unit(at);
         let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];

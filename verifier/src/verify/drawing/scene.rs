@@ -1,6 +1,7 @@
 //! The two maps of a drawing.
 
-use meshmark_detection::{Demodulated, Matched, matching::Matches};
+use meshmark_core::deformation::Deformation;
+use meshmark_detection::{Matched, matching::Matches};
 
 /// The two maps after registration.
 pub struct Scene<'a> {
@@ -8,8 +9,10 @@ pub struct Scene<'a> {
     pub matched: &'a Matched<'a>,
     /// The matches after tracking of the deformation.
     pub matches: &'a Matches,
-    /// The demodulated evidence, if there is any.
-    pub demodulated: Option<&'a Demodulated>,
+    /// The deformation besides the mark, where it was estimated.
+    pub deformation: Option<Deformation>,
+    /// The weight of every reference vertex; none where nothing was demodulated.
+    pub weights: &'a [f64],
 }
 
 impl Scene<'_> {

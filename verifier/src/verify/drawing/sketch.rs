@@ -17,7 +17,6 @@ pub fn sketch(scene: &Scene, registration: &Registration) -> Sketch {
     let (reference, coords) = (scene.matched.reference, scene.coords());
     let extent = extent_of(&reference.data.vertices, &reference.ground);
     let displacements = scene.displacements_m();
-    let deformation = scene.demodulated.and_then(|demodulated| demodulated.deformation);
     let lengths: Vec<f64> = displacements.iter().flatten().map(|[x, y]| x.hypot(*y)).collect();
     let inserted = scene.inserted();
     Sketch {
@@ -25,7 +24,7 @@ pub fn sketch(scene: &Scene, registration: &Registration) -> Sketch {
         patches: reference.patches.as_slice().iter().map(|patch| place(scene, patch)).collect(),
         displacement_m: Histogram::of_values(&lengths, BINS),
         alignment: alignment(scene.matched, registration),
-        deformation: deformation.map(|d| DeformationEntry {
+        deformation: scene.deformation.map(|d| DeformationEntry {
             deviation_m: d.deviation_m,
             range_m: d.range_m,
             group_shift_m: d.group_shift_m,

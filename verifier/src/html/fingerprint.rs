@@ -1,0 +1,39 @@
+//! The agreement of the secret signs.
+
+use super::page::{count, section, table};
+use crate::report::{FingerprintEntry, PatchAgreement, Report, SignAgreement};
+use maud::{Markup, html};
+
+pub fn fingerprint(report: &Report) -> Markup {
+    let content = match &report.fingerprint {
+        None => html! { p { "Nothing was observed, so there are no signs to show." } },
+        Some(fingerprint) => agreement(fingerprint),
+    };
+    section("The secret signs", &content)
+}
+
+fn agreement(fingerprint: &FingerprintEntry) -> Markup {
+    let FingerprintEntry { recipient, key, patches: PatchAgreement { seen, clear } } = fingerprint;
+    html! {
+        p {
+            "Every coefficient of the mark has a secret sign that only the key can make. Those of a recipient who had no part \
+             in this map agree with it as the flips of a coin do. "
+        }
+        (table(&[
+            ("Signs of the recipient", Some(signs(recipient))),
+            ("Signs of the key, which all copies have", Some(signs(key))),
+            ("Patches", Some(html! {
+                (count(*clear)) " of the " (count(*seen)) " patches that were seen show the recipient by themselves, by "
+                (PatchAgreement::CLEAR) " standard deviations or more"
+            })),
+        ]))
+    }
+}
+
+fn signs(agreement: &SignAgreement) -> Markup {
+    let SignAgreement { signs, agreeing, by_chance, by_chance_deviation, score, .. } = agreement;
+    html! {
+        "of " (count(*signs)) " secret signs " (count(*agreeing)) " agree; by chance " (format!("{by_chance:.0} ± {by_chance_deviation:.0}"))
+        " would. The score is " (format!("{score:.1}").replace('-', "−")) " standard deviations"
+    }
+}

@@ -1,0 +1,149 @@
+//! The evidence of a matched suspect about a mark: of a message, or of the fingerprints of a key.
+
+use super::request::{Request, Sought};
+use crate::progress::Progress;
+use meshmark_core::{
+    agreement::{Agreement, Evidence},
+    deformation::Deformation,
+    demodulation::Demodulation,
+    estimation::Estimates,
+    fingerprint::{Fingerprint, pilots, recipient_signs},
+    key::SecretKey,
+    part::PartDigest,
+};
+use meshmark_detection::{
+    Demodulated, Estimated, Matched, Observations,
+    decision::{
+        Decoys,
+        fingerprints::{Answer, Grounds},
+        recipients::Standing,
+    },
+    matching::{Matches, Radius},
+    power::Power,
+};
+
+/// The evidence about the mark that is sought.
+pub enum Found {
+    /// About a message.
+    Message(MessageEvidence),
+    /// About fingerprints.
+    Fingerprint(FingerprintEvidence),
+}
+
+/// The evidence about a message under a key, before the comparison with one.
+pub struct MessageEvidence {
+    /// The demodulated evidence.
+    pub demodulation: Demodulation,
+    /// What a present mark would show.
+    pub power: Power,
+    /// Scores of decoy keys.
+    pub decoys: Option<Decoys>,
+}
+
+/// The evidence about the fingerprints of recipients.
+pub struct FingerprintEvidence {
+    /// The estimates of all signs.
+    pub estimates: Estimates,
+    /// The part of the map, on which the signs depend.
+    pub part: PartDigest,
+    /// The standing of each recipient, and the answer about it.
+    pub recipients: Vec<(Standing, Answer)>,
+    /// The agreement of the key's pilots.
+    pub pilots: Agreement,
+    /// Standard deviation of the noise, metres.
+    pub noise_m: f64,
+}
+
+/// What was observed besides the mark.
+pub struct Surroundings {
+    /// The matching radius after tracking of the deformation.
+    pub radius: Radius,
+    /// The matches after tracking of the deformation.
+    pub matches: Matches,
+    /// The estimated deformation; none with the demodulator of the paper.
+    pub deformation: Option<Deformation>,
+    /// The weight of every reference vertex.
+    pub weights: Vec<f64>,
+    /// What the displacements were observed on.
+    pub observations: Observations,
+}
+
+/// Returns the evidence for the mark of a request; nothing where matches are chance.
+pub fn collect(
+    request: &Request,
+    matched: &Matched,
+    progress: &mut Progress,
+) -> meshmark_core::Result<Option<(Found, Surroundings)>> {
+    if matched.is_chance(request.demodulator) {
+        return Ok(None);
+    }
+    let found = match &request.sought {
+        Sought::Message { bits } => of_message(request, *bits, matched, progress)?,
+        Sought::Fingerprint { recipients, tried, .. } => {
+            of_fingerprints(request, (recipients, *tried), matched, progress)?
+        }
+    };
+    Ok(Some(found))
+}
+
+/// Demodulates, and measures what a present mark would show.
+fn of_message(
+    request: &Request,
+    bits: usize,
+    matched: &Matched,
+    progress: &mut Progress,
+) -> meshmark_core::Result<(Found, Surroundings)> {
+    let (mark, demodulator) = (request.mark(bits), request.demodulator);
+    let seen = progress.listen(|listener| matched.demodulate(mark, demodulator, listener))?;
+    let power = progress.listen(|listener| Power::measure(matched, &seen, mark, demodulator, listener))?;
+    let Demodulated { found: demodulation, radius, matches, deformation, weights, observations, decoys } =
+        seen;
+    let surroundings = Surroundings { radius, matches, deformation, weights, observations };
+    Ok((Found::Message(MessageEvidence { demodulation, power, decoys }), surroundings))
+}
+
+/// Estimates all signs, and decides on the recipients of a request.
+fn of_fingerprints(
+    request: &Request,
+    (recipients, tried): (&[String], usize),
+    matched: &Matched,
+    progress: &mut Progress,
+) -> meshmark_core::Result<(Found, Surroundings)> {
+    let (parameters, significance) = (&request.parameters, request.significance);
+    let part = PartDigest::of(&matched.reference.data.vertices);
+    let pilots = pilots(&request.key, &part);
+    let fingerprint = |recipient: &String| Fingerprint::new(&request.key, &part, recipient);
+    let fingerprints: Vec<Fingerprint> = recipients.iter().map(fingerprint).collect();
+    let seen = progress.listen(|listener| matched.estimate(parameters, listener))?;
+    let power =
+        progress.listen(|listener| Power::of_fingerprint(matched, &seen, &pilots, parameters, listener))?;
+    let standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
+    let pilot_amplitude = Evidence::of_pilots(&seen.estimates).amplitude(&pilots);
+    let evidence = Evidence::of_recipients(&seen.estimates);
+    let grounds = Grounds { evidence: &evidence, pilot_amplitude, power, tried, significance };
+    let decide = |standing: Standing| (standing, grounds.decide(&standing));
+    let recipients = standings.into_iter().map(decide).collect();
+    let pilots = seen.key_agreement(&pilots);
+    let Estimated { estimates, radius, matches, disturbance, observations, .. } = seen;
+    let deformation = disturbance.deformation;
+    // Points of features have no weight of a vertex.
+    let weights = match observations.is_of_features() {
+        true => vec![1.0; matched.reference.patches.vertex_count()],
+        false => disturbance.weights,
+    };
+    let noise_m = deformation.noise_m;
+    let surroundings =
+        Surroundings { radius, matches, deformation: Some(deformation), weights, observations };
+    let found = FingerprintEvidence { estimates, part, recipients, pilots, noise_m };
+    Ok((Found::Fingerprint(found), surroundings))
+}
+
+impl FingerprintEvidence {
+    /// Returns the score of a recipient in every patch alone; `None` where nothing was observed.
+    pub fn patch_scores(&self, key: &SecretKey, recipient: &str) -> Vec<Option<f64>> {
+        let evidence = Evidence::of_recipients(&self.estimates);
+        let signs = recipient_signs(key, &self.part, recipient);
+        let score = |patch: Agreement| (patch.signs > 0).then_some(patch.score);
+        evidence.patch_agreements(&signs).into_iter().map(score).collect()
+    }
+}
