@@ -7,6 +7,8 @@
 //! its own: for the same displacement they give twice as many signs as one for both would, and a
 //! mixture of copies has fewer than signs divided by copies to tell them apart by.
 
+pub use crate::signs::COEFFICIENTS;
+
 use crate::{
     Error, Result,
     agreement::Evidence,
@@ -19,9 +21,6 @@ use crate::{
     patches::Patches,
     signs::{Sequence, Signs, is_pilot},
 };
-
-/// Coefficients of a patch and axis that carry a fingerprint by default.
-pub const COEFFICIENTS: usize = 256;
 
 /// A marked map is refused when the score of its own recipient is below this many standard
 /// deviations of those of others, p = 10⁻¹⁵.

@@ -52,6 +52,14 @@ impl Recorded {
         }
     }
 
+    /// Returns the text of the record.
+    pub fn to_json(&self) -> String {
+        match self {
+            Recorded::Message(record) => record.to_json(),
+            Recorded::Fingerprint(record) => record.to_json(),
+        }
+    }
+
     /// Returns whether the record was made with this key.
     pub fn is_of(&self, key: &SecretKey) -> bool {
         match self {

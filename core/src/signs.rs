@@ -5,6 +5,9 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
+/// Coefficients of a patch and axis that carry a fingerprint by default.
+pub const COEFFICIENTS: usize = 256;
+
 /// Every so many coefficients of a fingerprint there is a pilot, see [`crate::fingerprint`].
 pub(crate) const PILOT_EVERY: usize = 8;
 

@@ -19,6 +19,7 @@ use meshmark_core::{
     options::{Options, Parameters, Spelling, Subject},
     part::PartDigest,
     record::{self, Distortion, Record, Reference, TopologyEntry},
+    recorded::Recorded,
     scale::Measure,
     vertices::VertexTable,
 };
@@ -104,21 +105,23 @@ pub fn check_scale(map: &Map, crs: Option<&CoordinateSystem>) -> Result<()> {
     }
 }
 
-/// Returns warnings about what is legal and probably not intended.
+/// Returns warnings about what is legal and probably not intended. `message` is what the code carries;
+/// a fingerprint has none.
 pub fn warnings(
-    parameters: &Parameters,
-    message: &Message,
+    options: &Options,
+    message: Option<&Message>,
     map: &Survey,
     patches: usize,
     spelling: Spelling,
 ) -> Vec<String> {
+    let parameters = &options.parameters;
     let mut warnings = Vec::new();
     if map.crs.is_none() {
         let srs = spelling.value("SRS", "...");
         warnings
             .push(format!("the source has no CRS: its units are taken as metres; say {srs} if they are not"));
     }
-    if message.len() < LEAST_IDENTIFYING_BITS {
+    if let Some(message) = message.filter(|message| message.len() < LEAST_IDENTIFYING_BITS) {
         warnings.push(format!(
             "a message of {} bits identifies nobody, and verification will never call it a match: use {} \
              hexadecimal digits or more",
@@ -126,8 +129,9 @@ pub fn warnings(
             ADVISED_BITS / 4
         ));
     }
-    let channel_bits = parameters.code.encode(message).len();
-    let coefficients = 2 * patches * channel_bits * parameters.chip_rate; // on two axes
+    let of_message = |message| parameters.code.encode(message).len() * parameters.chip_rate;
+    let of_patch = options.coefficients.or(message.map(of_message)).unwrap_or_default();
+    let coefficients = 2 * patches * of_patch; // on two axes
     let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.data.vertices.len() as f64).sqrt();
     if wanted_rms_m > parameters.tolerance_m {
         warnings.push(format!(
@@ -247,7 +251,28 @@ fn outlines<'a>(
     Outlines { count: geometries.len(), get }
 }
 
-/// Returns the record of a marking.
+/// Returns the record of a marking, a fingerprint or a message as the options have it.
+pub fn recorded(
+    options: &Options,
+    subject: &Subject,
+    key: &SecretKey,
+    reference: Reference,
+    distortion: Distortion,
+) -> Recorded {
+    match (options.coefficients, subject) {
+        (Some(coefficients), Subject::Recipient(recipient)) => Recorded::Fingerprint(fingerprint_record(
+            options,
+            recipient,
+            key,
+            coefficients,
+            reference,
+            distortion,
+        )),
+        _ => Recorded::Message(record(options, subject, key, reference, distortion)),
+    }
+}
+
+/// Returns the record of a marking with a message.
 pub fn record(
     options: &Options,
     subject: &Subject,

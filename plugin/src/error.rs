@@ -104,6 +104,12 @@ pub enum Error {
         digits.more().map(|more| format!(", or keep more digits: {more}")).unwrap_or_default()
     )]
     MessageUnreadable { errors: usize, bits: usize, digits: Digits },
+    #[error(
+        "the signs of the recipient agree by only {score:.1} standard deviations with what was written with {digits}: raise \
+         AMPLITUDE{}",
+        digits.more().map(|more| format!(", or keep more digits: {more}")).unwrap_or_default()
+    )]
+    FingerprintUnreadable { score: f64, digits: Digits },
     #[error(transparent)]
     Dataset(#[from] meshmark_dataset::Error),
     #[error(transparent)]

@@ -7,11 +7,19 @@ use crate::{
 };
 use gdal::Dataset;
 use meshmark_core::{
+    agreement::Evidence,
     carrier::Carrier,
-    demodulation, embedding,
+    deformation::Prediction,
+    demodulation,
+    embedding::{self, Marked},
+    estimation::Estimates,
+    fingerprint::{self, recipient_signs},
     key::{SecretKey, read_text},
+    map::Map,
     options::{Options, Spelling, Subject},
+    part::PartDigest,
     patches::Patches,
+    recorded::Recorded,
 };
 use meshmark_dataset::{
     LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool,
@@ -20,6 +28,9 @@ use meshmark_dataset::{
     same_file, survey,
 };
 use std::{fs::File, path::Path};
+
+/// The noise that the estimates from a file that was read back assume, metres.
+const READ_BACK_NOISE_M: f64 = 0.01;
 
 /// Options that GDAL adds to the open options of any driver.
 const HINTS_OF_GDAL: [&str; 3] = ["NATIVE_DATA", "VALIDATE_OPEN_OPTIONS", "NOLOCK"];
@@ -74,6 +85,17 @@ impl MarkingRequest {
         }
     }
 
+    /// Marks a map.
+    fn embed(&self, map: &Map) -> meshmark_core::Result<Marked> {
+        let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = self;
+        match (coefficients, subject) {
+            (Some(coefficients), Subject::Recipient(recipient)) => {
+                fingerprint::embed(map, key, recipient, *coefficients, parameters)
+            }
+            _ => embedding::embed(map, key, &subject.carried(key), parameters),
+        }
+    }
+
     /// Returns the path of the record.
     pub fn record_path(&self) -> Option<&Path> {
         self.options.record_path.as_deref().map(Path::new)
@@ -117,8 +139,8 @@ pub struct Marking {
     moved: Vec<[f64; 2]>,
     layers: Option<Vec<String>>,
     files: SourceFiles,
-    /// The text of its record, if one is wanted.
-    pub record: Option<String>,
+    /// Its record, if one is wanted.
+    pub record: Option<Recorded>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
@@ -134,20 +156,19 @@ impl Marking {
         let on_ground = map.map()?;
         marking::check_extent(&on_ground, &options.parameters)?;
         marking::check_scale(&on_ground, map.crs.as_ref())?;
-        let message = request.subject.carried(&request.key);
         let pool = pool(threads)?;
-        let marked =
-            pool.install(|| embedding::embed(&on_ground, &request.key, &message, &options.parameters))?;
+        let marked = pool.install(|| request.embed(&on_ground))?;
         let record = map.geometries.as_ref().map(|geometries| {
             let parameters = &options.parameters;
             let distortion =
                 pool.install(|| Unmarked::new(geometries, &on_ground).distortion(&marked, parameters));
             let reference = marking::reference(&map, marked.patches);
-            marking::record(options, &request.subject, &request.key, reference, distortion).to_json()
+            marking::recorded(options, &request.subject, &request.key, reference, distortion)
         });
         map.geometries = None;
         let spelling = Spelling::OpenOption;
-        let warnings = marking::warnings(&options.parameters, &message, &map, marked.patches, spelling);
+        let message = options.coefficients.is_none().then(|| request.subject.carried(&request.key));
+        let warnings = marking::warnings(options, message.as_ref(), &map, marked.patches, spelling);
         Ok(Marking {
             name: source.name,
             map,
@@ -161,34 +182,45 @@ impl Marking {
 
     /// Writes the record to the path of the request.
     pub fn write_record(&self, request: &MarkingRequest) -> Result<()> {
-        let wanted = request.record_path().zip(self.record.as_deref());
-        wanted.map_or(Ok(()), |(path, text)| record_file::write(path, text))
+        let wanted = request.record_path().zip(self.record.as_ref());
+        wanted.map_or(Ok(()), |(path, record)| record_file::write(path, &record.to_json()))
     }
 
-    /// Fails unless the message can be demodulated from the places `found` of the vertices, which
-    /// are their new places as read back, in canonical order.
+    /// Fails unless the mark can be read from the places `found` of the vertices, which are their
+    /// new places as read back, in canonical order.
     ///
-    /// [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are
+    /// For a message [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are
     /// no erasures for [`demodulation::joint`] to leave out, and the noise that it would weigh, the
     /// rounding to the digits of the format, has no estimate here. [`embedding`] has an estimate of
     /// its own noise and uses `joint`. The two checks stay different, as a change of the
     /// demodulator would change which outputs are refused.
-    pub fn check_message(
+    pub fn check_mark(
         &self,
         request: &MarkingRequest,
         found: &[[f64; 2]],
         digits: Digits,
         threads: usize,
     ) -> Result<()> {
-        let parameters = &request.options.parameters;
-        let message = request.subject.carried(&request.key);
+        let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = request;
         let map = self.map.map()?;
         let pairs = map.vertices.coords().iter().zip(found);
         let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();
-        let demodulated = pool(threads)?.install(|| {
-            let patches = Patches::new(&map, parameters)?;
-            let carrier = Carrier::new(&request.key);
-            demodulation::paper(&patches, &carrier, &observed, message.len(), parameters, &|_| ())
+        let pool = pool(threads)?;
+        let patches = || Patches::new(&map, parameters);
+        if let (Some(coefficients), Subject::Recipient(recipient)) = (*coefficients, subject) {
+            let noise = Prediction::of_noise(READ_BACK_NOISE_M, observed.len());
+            let estimates = pool.install(|| {
+                Estimates::new(&patches()?, &observed, coefficients, parameters, &noise, &|_| ())
+            })?;
+            let signs = recipient_signs(key, &PartDigest::of(map.vertices), recipient);
+            let score = Evidence::of_recipients(&estimates).agreement(&signs).score;
+            return fingerprint::check_score(score)
+                .map_err(|_| Error::FingerprintUnreadable { score, digits });
+        }
+        let message = subject.carried(key);
+        let demodulated = pool.install(|| {
+            let carrier = Carrier::new(key);
+            demodulation::paper(&patches()?, &carrier, &observed, message.len(), parameters, &|_| ())
         })?;
         match demodulated.message().errors(&message) {
             0 => Ok(()),

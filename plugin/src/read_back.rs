@@ -1,5 +1,5 @@
-//! Reading back: this module checks that a written file holds what was meant, and that the message
-//! can be demodulated from its vertices.
+//! Reading back: this module checks that a written file holds what was meant, and that the mark
+//! can be read from its vertices.
 
 use crate::{
     error::{Error, Result},
@@ -35,7 +35,7 @@ pub struct WrittenLayer {
 }
 
 /// Fails unless the file holds the features of the marked map, within the precision of its format,
-/// and the message.
+/// and the mark.
 pub fn check(written: &Written, view: &View, request: &MarkingRequest, threads: usize) -> Result<()> {
     let file = open(written)?;
     let meant = view.dataset();
@@ -59,7 +59,7 @@ pub fn check(written: &Written, view: &View, request: &MarkingRequest, threads: 
     let found = digits.find_all(view.marking().moved(), vertices);
     let found = found
         .ok_or_else(|| not_kept(written, &written.layers[0], "a vertex is missing".to_string().into()))?;
-    view.marking().check_message(request, &found, digits, threads)
+    view.marking().check_mark(request, &found, digits, threads)
 }
 
 fn not_kept(written: &Written, layer: &WrittenLayer, difference: Difference) -> Error {

@@ -20,12 +20,16 @@ use crate::{
     staged_layer::StagedLayer,
     target::{Places, Target},
 };
+use meshmark_core::recorded::Recorded;
 use meshmark_dataset::{
-    Action, file_error,
+    Action, file_digest, file_error,
     marking::foreign_places,
     publication::{Move, Publication},
 };
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// The function that marks an open dataset; the border provides it.
 pub type Mark<'a> = &'a dyn Fn(&MarkingRequest, &Borrowed) -> Result<Marking>;
@@ -176,7 +180,8 @@ impl Writer {
         warnings.extend(told.map(|layer| foreign_places(&layer.spec.name)));
         let record = view.marking().record.clone();
         drop((view, schema));
-        publish(&target, &places, &folder, record.as_deref())?;
+        let record = record.map(|record| with_digests(record, &places, &folder)).transpose()?;
+        publish(&target, &places, &folder, record.map(|record| record.to_json()).as_deref())?;
         Ok(warnings)
     }
 
@@ -220,6 +225,21 @@ fn write_marked(
     }
     output.close()?;
     Ok(written)
+}
+
+/// Returns the record with the digests of the reference and, where it is one file, of the copy in
+/// `folder`.
+fn with_digests(record: Recorded, places: &Places, folder: &Path) -> Result<Recorded> {
+    let Recorded::Fingerprint(mut record) = record else { return Ok(record) };
+    let digest = |path: &Path| file_digest(path).map_err(|e| file_error(Action::Reading, path, e));
+    let entries = fs::read_dir(folder).map_err(|e| file_error(Action::Reading, folder, e))?;
+    let files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    record.reference.file_sha256 = Some(digest(&places.staged)?);
+    record.copy.file_sha256 = match files.as_slice() {
+        [file] if file.is_file() => Some(digest(file)?),
+        _ => None,
+    };
+    Ok(Recorded::Fingerprint(record))
 }
 
 /// Puts record, reference and the files in `folder` into their places.

@@ -19,7 +19,7 @@ pub use table::{
     CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
 };
 
-use crate::{Result, message::Message};
+use crate::{Result, message::Message, signs::COEFFICIENTS};
 use values::Values;
 
 /// All options of one marking, parsed.
@@ -43,8 +43,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Parses name-value pairs; names may be in any case. A message that is not given counts as
-    /// long as a recipient's.
+    /// Parses name-value pairs; names may be in any case. RECIPIENT makes a fingerprint, and with
+    /// CODE or CHIP_RATE a message. A message that is not given counts as long as a recipient's.
     ///
     /// # Errors
     /// Fails on an unknown name, a name given twice, a value that its row excludes, both RECIPIENT
@@ -56,6 +56,8 @@ impl Options {
             Some(Subject::Message(message)) => message.len(),
             _ => RECIPIENT_BITS,
         };
+        let of_message = ["CODE", "CHIP_RATE"].iter().any(|name| values.given(name).is_some());
+        let is_fingerprint = matches!(subject, Some(Subject::Recipient(_))) && !of_message;
         let code = values.choice("CODE", Code::from_name)?.unwrap_or(Code::default_for(bits));
         code.channel_bits(bits)?;
         Ok(Options {
@@ -71,7 +73,7 @@ impl Options {
                 basis: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
                 precision_crs_units: values.number("PRECISION")?,
             },
-            coefficients: None,
+            coefficients: is_fingerprint.then_some(COEFFICIENTS),
             layers: values.list("LAYERS")?,
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
@@ -159,6 +161,17 @@ mod tests {
             assert_eq!(parsed(&[("MESSAGE", hex), ("CHIP_RATE", "3")]), (Code::Repetition, 3));
         }
         assert_eq!(Parameters::default(), Options::parse([("RECIPIENT", "ACME")]).unwrap().parameters);
+    }
+
+    #[test]
+    fn a_recipient_has_a_fingerprint_unless_options_of_a_message_are_given() {
+        let coefficients = |pairs: &[_]| Options::parse(pairs.iter().copied()).unwrap().coefficients;
+        let recipient = ("RECIPIENT", "ACME");
+        assert_eq!(coefficients(&[recipient]), Some(COEFFICIENTS));
+        for of_message in [("CODE", "LDPC"), ("CODE", "REPETITION"), ("CHIP_RATE", "1")] {
+            assert_eq!(coefficients(&[recipient, of_message]), None, "{of_message:?}");
+        }
+        assert_eq!([coefficients(&[]), coefficients(&[("MESSAGE", "00")])], [None; 2]);
     }
 
     #[test]

@@ -101,7 +101,7 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Text,
         None,
         true,
-        "Who receives this copy; the message is 128 bits of a keyed hash of this text",
+        "Who receives this copy: a fingerprint of its own; with CODE or CHIP_RATE a message, 128 bits of a keyed hash",
     ),
     row(
         "MESSAGE",

@@ -120,7 +120,7 @@ fn run(
     progress.start("patches", 0);
     let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
     let message = copies[0].carried(key);
-    let warnings = marking::warnings(parameters, &message, survey, embedding.patches(), Spelling::Flag);
+    let warnings = marking::warnings(options, Some(&message), survey, embedding.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
     let reference = marking::reference(survey, embedding.patches());
     let geometries = survey.geometries.as_ref().expect("the map was read with them");

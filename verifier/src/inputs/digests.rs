@@ -2,13 +2,12 @@
 
 use crate::{Error, Result, words::printable};
 use meshmark_core::hex;
-use meshmark_dataset::workplace::folder_of;
+use meshmark_dataset::{file_digest, workplace::folder_of};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::{
     fmt::Write as _,
-    fs::File,
-    io::{self, Read},
+    io,
     path::{Path, PathBuf},
 };
 
@@ -138,17 +137,6 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-fn file_digest(path: &Path) -> io::Result<String> {
-    let (mut file, mut hash) = (File::open(path)?, Sha256::new());
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut buffer)? {
-            0 => return Ok(hex::encode(&hash.finalize())),
-            count => hash.update(&buffer[..count]),
-        }
-    }
 }
 
 fn text_digest(bytes: &[u8]) -> String {
