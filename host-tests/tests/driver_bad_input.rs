@@ -165,15 +165,15 @@ fn a_message_that_is_too_long_for_the_patches_is_told_what_fits() {
         "CODE=LDPC and CHIP_RATE=1 needs 256",
         "use CODE=REPETITION and CHIP_RATE=1, or a larger PATCH_SIZE",
     ];
-    refuses_map(&host, &map(), &["-oo", "PATCH_SIZE=200"], &words);
+    refuses_map(&host, &map(), &["-oo", "CODE=LDPC", "-oo", "PATCH_SIZE=200"], &words);
     host.copy("kotka.gpkg", "map.gpkg");
     let advised = ["-oo", "PATCH_SIZE=200", "-oo", "CODE=REPETITION", "-oo", "CHIP_RATE=1"];
     host.mark("GPKG", "marked.gpkg", "map.gpkg", &advised).succeeds();
     let words = ["CODE=LDPC and CHIP_RATE=1 needs 256", "use a shorter message, or a larger PATCH_SIZE"];
-    refuses_map(&Host::new(), &map(), &["-oo", "PATCH_SIZE=100"], &words);
+    refuses_map(&Host::new(), &map(), &["-oo", "CODE=LDPC", "-oo", "PATCH_SIZE=100"], &words);
     let few = (0..200).map(|i| format!("{},{}", i % 20 * 31, i / 20 * 17 + i % 7));
     write_points(&host, "few.geojson", few);
-    let options = ["-oo", "PATCH_SIZE=100", "-oo", "SRS=EPSG:3067"];
+    let options = ["-oo", "CODE=LDPC", "-oo", "PATCH_SIZE=100", "-oo", "SRS=EPSG:3067"];
     let words = ["use a shorter message, or mark more layers together"];
     refuses_map(&host, &host.path("few.geojson").display().to_string(), &options, &words);
 }

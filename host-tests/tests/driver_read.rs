@@ -2,7 +2,8 @@
 
 use gdal::Dataset;
 use meshmark_core::{
-    carrier::Carrier, code::Code, demodulation, ground::Ground, patches::Patches, record::Record,
+    carrier::Carrier, code::Code, demodulation, fingerprint::COEFFICIENTS,
+    fingerprint_record::FingerprintRecord, ground::Ground, patches::Patches, record::Record,
     vertices::VertexTable,
 };
 use meshmark_dataset::{Selection, Survey, survey};
@@ -59,7 +60,8 @@ fn all_geometry_types_are_marked_and_z_m_null_and_empty_ones_stay() {
 #[test]
 fn the_message_can_be_read_from_what_ogr2ogr_wrote() {
     let host = Host::new();
-    host.mark("GPKG", "marked.gpkg", &source("kotka.gpkg"), &["-oo", "RECORD=acme.json"]).succeeds();
+    let options = ["-oo", "CODE=LDPC", "-oo", "RECORD=acme.json"];
+    host.mark("GPKG", "marked.gpkg", &source("kotka.gpkg"), &options).succeeds();
     let record = Record::from_json(&fs::read_to_string(host.path("acme.json")).unwrap()).unwrap();
     let moves = moves(&contents::read(&fixture("kotka.gpkg")), &contents::read(&host.path("marked.gpkg")));
 
@@ -86,7 +88,7 @@ fn the_record_says_what_was_done_and_keeps_the_secret() {
     let options = ["-oo", "RECORD=acme.json", "-oo", "AMPLITUDE=0.2", "-oo", "LAYERS=roads,buildings"];
     let run = host.mark("GPKG", "marked.gpkg", "map.gpkg", &options).succeeds();
     let text = fs::read_to_string(host.path("acme.json")).unwrap();
-    let record = Record::from_json(&text).unwrap();
+    let record = FingerprintRecord::from_json(&text).unwrap();
 
     let named = |path: &Path| -> Vec<LayerContents> {
         contents::read(path)
@@ -99,14 +101,12 @@ fn the_record_says_what_was_done_and_keeps_the_secret() {
     assert_eq!(record.reference.vertices, table.len());
     assert_eq!(record.reference.vertices_sha256, table.digest());
     assert_eq!(record.reference.crs.as_deref(), Some("EPSG:3067"));
-    assert_eq!((record.parameters.amplitude_m, record.parameters.patch_size), (0.2, 480));
-    assert_eq!((record.parameters.code, record.parameters.chip_rate), (Code::Ldpc, 1));
-    assert_eq!(record.recipient.as_deref(), Some("ACME GmbH"));
-    assert_eq!(record.message, host.key().recipient_message("ACME GmbH").to_hex());
-    assert_eq!(record.key_id, host.key().id());
+    assert_eq!((record.mark.amplitude_m, record.mark.patch_size), (0.2, 480));
+    assert_eq!((record.mark.coefficients, record.recipient.as_str()), (COEFFICIENTS, "ACME GmbH"));
+    assert!(record.is_of(&host.key()));
     assert_eq!(record.layers, Some(vec!["roads".into(), "buildings".into()]));
     let (rms, max) = lengths(&moves(&before, &after));
-    let recorded = record.displacement;
+    let recorded = record.distortion.displacement;
     assert!((recorded.rms_m / rms - 1.0).abs() < 0.001 && (recorded.max_m / max - 1.0).abs() < 0.001);
     assert!(recorded.rms_m < recorded.p99_m && recorded.p99_m < recorded.max_m);
     for seen in [&text, &run.stdout, &run.stderr] {
@@ -445,7 +445,8 @@ fn a_map_without_crs_is_marked_in_metres_with_one_warning() {
     let run = host.mark("GPKG", "marked.gpkg", "bare.shp", &["-oo", "RECORD=record.json"]).succeeds();
     let ours: Vec<_> = run.warnings().into_iter().filter(|line| line.contains("MESHMARK")).collect();
     assert!(matches!(ours[..], [only] if only.contains("no CRS") && only.contains("SRS=")), "{}", run.stderr);
-    let record = Record::from_json(&fs::read_to_string(host.path("record.json")).unwrap()).unwrap();
+    let record =
+        FingerprintRecord::from_json(&fs::read_to_string(host.path("record.json")).unwrap()).unwrap();
     assert_eq!(record.reference.crs, None);
     let given = host.mark("GPKG", "given.gpkg", "bare.shp", &["-oo", "SRS=EPSG:3067"]).succeeds();
     assert!(!given.stderr.contains("MESHMARK"), "{}", given.stderr);

@@ -1,6 +1,6 @@
 //! Marking as the last step: the results of writing to MESHMARK with `ogr2ogr`.
 
-use meshmark_core::record::Record;
+use meshmark_core::fingerprint_record::FingerprintRecord;
 use meshmark_host_tests::{
     contents::{self, LayerContents, lengths, moves},
     faults::points,
@@ -12,8 +12,8 @@ fn source(name: &str) -> String {
     fixture(name).display().to_string()
 }
 
-fn record(host: &Host) -> Record {
-    Record::from_json(&fs::read_to_string(host.path("record.json")).unwrap()).unwrap()
+fn record(host: &Host) -> FingerprintRecord {
+    FingerprintRecord::from_json(&fs::read_to_string(host.path("record.json")).unwrap()).unwrap()
 }
 
 #[test]

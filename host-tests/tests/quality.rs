@@ -44,10 +44,10 @@ fn no_polygon_becomes_invalid_and_record_and_comparison_give_the_same_figures() 
                 ("validity", 3),
                 ("overlaps", 5),
             ] {
-                assert_eq!(record[figures].as_object().unwrap().len(), count);
-                for figure in record[figures].as_object().unwrap().keys() {
+                assert_eq!(record["distortion"][figures].as_object().unwrap().len(), count);
+                for figure in record["distortion"][figures].as_object().unwrap().keys() {
                     let pointer = format!("/{figures}/{figure}");
-                    let difference = number(&record, &pointer) - number(&compared, &pointer);
+                    let difference = number(&record["distortion"], &pointer) - number(&compared, &pointer);
                     assert!(difference.abs() < 1e-9, "{fixture} {shape} {basis}: {pointer}");
                 }
             }
@@ -56,7 +56,7 @@ fn no_polygon_becomes_invalid_and_record_and_comparison_give_the_same_figures() 
 }
 
 #[test]
-fn right_angles_stay_right_when_shapes_are_rigid_and_the_message_is_read() {
+fn right_angles_stay_right_when_shapes_are_rigid_and_the_recipient_is_named() {
     for basis in Laplacian::NAMES {
         let host = Host::new();
         host.copy("kotka.gpkg", "map.gpkg");
@@ -70,6 +70,6 @@ fn right_angles_stay_right_when_shapes_are_rigid_and_the_message_is_read() {
         let verify =
             ["verify", "--json", "--key", "key.json", "--reference", "map.gpkg", "--record", "record.json"];
         let report = meshmark(&host, &[&verify[..], &["marked.gpkg"]].concat());
-        assert_eq!((&report["verdict"], number(&report, "/bit_errors")), (&"match".into(), 0.0));
+        assert_eq!(report["verdict"], "match");
     }
 }

@@ -110,12 +110,13 @@ fn record(host: &Host) -> Value {
 }
 
 #[test]
-fn a_recipient_is_coded_by_default_and_read_with_a_record_and_without() {
-    let host = marked("kotka.gpkg", &[]);
+fn the_message_of_a_recipient_is_read_with_a_record_and_without() {
+    let host = marked("kotka.gpkg", &["-oo", "CODE=LDPC"]);
     assert_eq!(code_of(&record(&host)), ("ldpc", 1));
     let message = host.key().recipient_message("ACME GmbH").to_hex();
-    for how in [["--record", "acme.json"], ["--recipient", "ACME GmbH"], ["--message", &message]] {
-        let report = host.matches("map.gpkg", &[&how[..], &["marked.gpkg"]].concat());
+    let of_recipient = ["--code", "ldpc", "--recipient", "ACME GmbH"];
+    for how in [&["--record", "acme.json"][..], &of_recipient, &["--message", &message]] {
+        let report = host.matches("map.gpkg", &[how, &["marked.gpkg"]].concat());
         assert_eq!(code_of(&report["parameters"]), ("ldpc", 1));
         assert_eq!(report["code"]["parity_holds"], true);
         assert_eq!(report["code"]["decoder"], "belief-propagation");
@@ -157,7 +158,7 @@ fn a_code_that_is_given_is_the_one_of_the_mark() {
 
 #[test]
 fn a_person_reads_how_the_message_was_decoded() {
-    let host = marked("kotka.gpkg", &[]);
+    let host = marked("kotka.gpkg", &["-oo", "CODE=LDPC"]);
     let command = library().with_file_name("meshmark");
     let arguments =
         ["verify", "--explain", "--key", "key.json", "--reference", "map.gpkg", "--record", "acme.json"];

@@ -227,9 +227,12 @@ impl Error {
             Dataset(MapError::File { .. } | MapError::NotKept { .. } | MapError::Gdal(_)) => {
                 ExitCode::Unwritable
             }
-            OtherKey { .. } | OtherMessage | OtherReference { .. } | NoReferenceOfRecord { .. } => {
-                ExitCode::DoesNotBelong
-            }
+            OtherKey { .. }
+            | OtherCommitment { .. }
+            | OtherParts { .. }
+            | OtherMessage
+            | OtherReference { .. }
+            | NoReferenceOfRecord { .. } => ExitCode::DoesNotBelong,
             Unopened { .. }
             | Unconverted { .. }
             | Unmeasured { .. }

@@ -43,6 +43,8 @@ fn make_files(folder: &Path) {
     for file in ["key.json", "record.json", "marked.gpkg"] {
         copy(&format!("vectors/{file}"), file);
     }
+    copy("vectors/fingerprint/record.json", "record_of_a_fingerprint.json");
+    copy("vectors/fingerprint/marked.gpkg", "fingerprint.gpkg");
     let write = |file: &str, bytes: &[u8]| fs::write(folder.join(file), bytes).unwrap();
     let (key, record) = (read(folder, "key.json"), read(folder, "record.json"));
     write("another_key.json", SecretKey::from_bytes([1; 32]).to_json().as_bytes());

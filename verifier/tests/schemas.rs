@@ -310,6 +310,7 @@ fn report_and_warnings(suspect: &str, flags: &[&str]) -> (Value, String) {
         "marked map" => "vectors/marked.gpkg",
         "unmarked map" => "kotka.gpkg",
         "another map" => "helsinki.gpkg",
+        "map with a fingerprint" => "vectors/fingerprint/marked.gpkg",
         other => panic!("no {other} among the fixtures"),
     };
     let output = Command::new(env!("CARGO_BIN_EXE_meshmark"))
@@ -337,6 +338,33 @@ fn reports_are_valid_for_every_verdict_and_both_demodulators() {
         assert_eq!(report["verdict"], verdict, "{suspect} {flags:?}");
         assert_valid("report", &report);
     }
+}
+
+#[test]
+fn reports_on_fingerprints_are_valid_for_every_verdict_and_hold_no_bits() {
+    let record = ["--record", "vectors/fingerprint/record.json"];
+    for (suspect, verdict) in
+        [("map with a fingerprint", "match"), ("unmarked map", "no-match"), ("another map", "inconclusive")]
+    {
+        let report = report(suspect, &record);
+        assert_eq!(report["verdict"], verdict, "{suspect}");
+        assert_valid("report", &report);
+        assert_eq!(
+            (&report["message"], &report["code"], &report["bits"]),
+            (&Value::Null, &Value::Null, &json!([]))
+        );
+        assert_eq!(report["fingerprint"].is_null(), verdict == "inconclusive");
+    }
+    let report = report("map with a fingerprint", &record);
+    assert_closed("report", &report, &["/fingerprint", "/fingerprint/recipient", "/fingerprint/patches"]);
+    let changes = [
+        ("/fingerprint/recipient/signs", json!(-1)),
+        ("/fingerprint/key/p_log10", json!(0.5)),
+        ("/fingerprint/patches/clear", json!(0.5)),
+        ("/parameters/coefficients", json!(0)),
+    ];
+    assert_refused("report", &report, &changes);
+    assert!(!errors("report", &without(&report, "/parameters", "coefficients")).is_empty());
 }
 
 /// vectors/ has one record, and two files that are none.

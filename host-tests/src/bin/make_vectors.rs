@@ -21,24 +21,26 @@ fn main() -> Result<()> {
         }
     }
     fs::write(folder.join("key.json"), vectors::key().to_json().as_bytes())?;
-    mark(&folder)?;
+    mark(&folder, &["KEY=key.json", "RECORD=record.json", "CODE=REPETITION"], "../kotka.gpkg")?;
     let steps = vectors::to_text(&ReferenceMarking::new().steps());
     fs::write(folder.join("steps.json"), steps)?;
     let (folder, (steps, record)) = (fingerprint_vectors::folder(), fingerprint_vectors::steps_and_record());
     fs::create_dir_all(&folder)?;
     fs::write(folder.join("steps.json"), vectors::to_text(&steps))?;
+    let _ = fs::remove_file(folder.join("marked.gpkg"));
+    mark(&folder, &["KEY=../key.json"], "../../kotka.gpkg")?;
     Ok(fs::write(folder.join("record.json"), record.to_json())?)
 }
 
 /// Runs `ogr2ogr` through the driver, with a fixed date so that the same map has the same bytes.
-fn mark(folder: &Path) -> Result<()> {
-    let options = ["KEY=key.json", "RECORD=record.json", "CODE=REPETITION"].map(String::from);
-    let options = options.into_iter().chain([format!("RECIPIENT={RECIPIENT}")]);
+fn mark(folder: &Path, options: &[&str], source: &str) -> Result<()> {
+    let options = options.iter().map(|option| option.to_string());
+    let options = options.chain([format!("RECIPIENT={RECIPIENT}")]);
     let status = Product::of_this_build()?
         .ogr2ogr()
         .current_dir(folder)
         .env("OGR_CURRENT_DATE", "2026-01-01T00:00:00.000Z")
-        .args(marking_arguments("GPKG", "marked.gpkg", "../kotka.gpkg", options))
+        .args(marking_arguments("GPKG", "marked.gpkg", source, options))
         .status()?;
     if status.success() { Ok(()) } else { Err(format!("ogr2ogr: {status}").into()) }
 }

@@ -51,6 +51,9 @@ impl FingerprintEntry {
     pub(crate) fn to_lines(self) -> Vec<String> {
         let FingerprintEntry { recipient, key, patches: PatchAgreement { seen, clear } } = self;
         let least = PatchAgreement::CLEAR;
+        if recipient.signs == 0 {
+            return vec!["signs:        no secret sign shows, for nothing moved".into()];
+        }
         vec![
             format!("signs:        {}", recipient.to_text("of the recipient")),
             format!("key:          {}", key.to_text("of the key")),

@@ -1,0 +1,82 @@
+//! Copies for recipients as the driver makes them: each names its own recipient, and a mixture names
+//! all of them.
+
+use meshmark_host_tests::{
+    attacks::{Map, collusion},
+    plugin::Host,
+};
+use serde_json::Value;
+
+const RECIPIENTS: [&str; 4] = ["ACME GmbH", "Other Ltd", "Third SARL", "Österreich & Söhne"];
+
+/// A map, and a copy and a record of each recipient.
+fn copies() -> Host {
+    let host = Host::new();
+    host.copy("kotka.gpkg", "map.gpkg");
+    std::fs::create_dir(host.path("records")).unwrap();
+    for (number, recipient) in RECIPIENTS.iter().enumerate() {
+        let options = [
+            "KEY=key.json".to_string(),
+            format!("RECIPIENT={recipient}"),
+            format!("RECORD=records/{number}.json"),
+        ];
+        let options = options.each_ref().map(|option| ["-oo", option.as_str()]);
+        let copy = format!("{number}.gpkg");
+        let command = ["-f", "GPKG", copy.as_str(), "MESHMARK:map.gpkg"];
+        host.run("ogr2ogr", &[&command[..], options.as_flattened()].concat()).succeeds();
+    }
+    host
+}
+
+fn matching(report: &Value) -> Vec<&str> {
+    let significance = report["parameters"]["significance"].as_f64().unwrap().log10();
+    let list = report["candidates"]["list"].as_array().unwrap().iter();
+    let matching = list.filter(|entry| entry["p_value_log10"].as_f64().unwrap() < significance);
+    let mut names: Vec<&str> = matching.map(|entry| entry["recipient"].as_str().unwrap()).collect();
+    names.sort_unstable();
+    names
+}
+
+#[test]
+fn a_copy_names_its_recipient_and_an_average_all_members() {
+    let host = copies();
+    for (record, code) in [("records/0.json", 0), ("records/1.json", 1)] {
+        let (run, report) = host.verify("map.gpkg", &["--record", record, "0.gpkg"]);
+        assert_eq!(run.code, Some(code), "{}", run.stdout);
+        assert!(report["message"].is_null() && report["fingerprint"]["key"]["signs"].as_u64().unwrap() > 0);
+    }
+    let (run, report) = host.verify("map.gpkg", &["--records", "records", "0.gpkg"]);
+    assert_eq!((run.code, matching(&report)), (Some(0), vec!["ACME GmbH"]), "{}", run.stdout);
+    let members: Vec<Map> = (0..3).map(|n| Map::read(&host.path(&format!("{n}.gpkg"))).unwrap()).collect();
+    collusion::average(&members).unwrap().write(&host.path("average.gpkg")).unwrap();
+    let (run, report) = host.verify("map.gpkg", &["--records", "records", "average.gpkg"]);
+    assert_eq!((run.code, matching(&report)), (Some(0), RECIPIENTS[..3].to_vec()), "{}", run.stdout);
+    assert_eq!(report["candidates"]["tried"], 4);
+}
+
+#[test]
+fn records_of_both_versions_are_tried_together() {
+    let host = copies();
+    let options = ["-oo", "CODE=LDPC", "-oo", "RECORD=records/message.json"];
+    host.mark("GPKG", "message.gpkg", "map.gpkg", &options).succeeds();
+    for (suspect, record) in [("message.gpkg", "message.json"), ("3.gpkg", "3.json")] {
+        let (run, report) = host.verify("map.gpkg", &["--records", "records", suspect]);
+        assert_eq!(run.code, Some(0), "{}", run.stdout);
+        assert_eq!(report["candidates"]["tried"], 5);
+        assert_eq!(report["candidates"]["list"][0]["record"], record);
+        assert_eq!(report["fingerprint"].is_object(), suspect == "3.gpkg");
+    }
+}
+
+#[test]
+fn the_record_of_an_export_has_the_digests_of_reference_and_copy() {
+    let host = Host::new();
+    host.copy("kotka.gpkg", "map.gpkg");
+    host.create("out.gpkg", "map.gpkg", &[]).succeeds();
+    let record: Value = serde_json::from_slice(&std::fs::read(host.path("record.json")).unwrap()).unwrap();
+    let digest = |file: &str| host.run("sha256sum", &[file]).succeeds().stdout[..64].to_string();
+    assert_eq!(record["meshmark_record"], 2);
+    assert_eq!(record["reference"]["file_sha256"], digest("ref.gpkg").as_str());
+    assert_eq!(record["copy"]["file_sha256"], digest("out.gpkg").as_str());
+    host.matches("ref.gpkg", &["--record", "record.json", "out.gpkg"]);
+}
