@@ -98,6 +98,11 @@ impl<'a> FingerprintEmbedding<'a> {
         self.part
     }
 
+    /// Returns how many patches there are.
+    pub fn patches(&self) -> usize {
+        self.groundwork.patches.as_slice().len()
+    }
+
     /// Returns how many recipients, at least one, [`Self::wanted`] handles at once within its
     /// memory.
     pub fn batch(&self) -> usize {

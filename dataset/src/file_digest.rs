@@ -22,3 +22,15 @@ pub fn file_digest(path: &Path) -> io::Result<String> {
         }
     }
 }
+
+/// Returns the SHA-256 of the only file of a folder; `None` where it holds more than one.
+///
+/// # Errors
+/// Fails when the folder or the file cannot be read to its end.
+pub fn digest_of_only_file(folder: &Path) -> io::Result<Option<String>> {
+    let entries: Vec<_> = folder.read_dir()?.collect::<io::Result<_>>()?;
+    match entries.as_slice() {
+        [entry] if entry.path().is_file() => file_digest(&entry.path()).map(Some),
+        _ => Ok(None),
+    }
+}

@@ -36,7 +36,7 @@ pub use assumption::{Assumption, likely_assumptions, overlaps};
 pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Action, Error, Result, file_error};
 pub use features::{FeatureGeometry, features};
-pub use file_digest::file_digest;
+pub use file_digest::{digest_of_only_file, file_digest};
 pub use file_id::{FileId, same_file};
 pub use geometries::{Geometries, Outline};
 pub use selection::{LabelFields, MOST_VERTICES, Selection};

@@ -22,14 +22,11 @@ use crate::{
 };
 use meshmark_core::recorded::Recorded;
 use meshmark_dataset::{
-    Action, file_digest, file_error,
+    Action, digest_of_only_file, file_digest, file_error,
     marking::foreign_places,
     publication::{Move, Publication},
 };
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 /// The function that marks an open dataset; the border provides it.
 pub type Mark<'a> = &'a dyn Fn(&MarkingRequest, &Borrowed) -> Result<Marking>;
@@ -231,14 +228,11 @@ fn write_marked(
 /// `folder`.
 fn with_digests(record: Recorded, places: &Places, folder: &Path) -> Result<Recorded> {
     let Recorded::Fingerprint(mut record) = record else { return Ok(record) };
-    let digest = |path: &Path| file_digest(path).map_err(|e| file_error(Action::Reading, path, e));
-    let entries = fs::read_dir(folder).map_err(|e| file_error(Action::Reading, folder, e))?;
-    let files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    record.reference.file_sha256 = Some(digest(&places.staged)?);
-    record.copy.file_sha256 = match files.as_slice() {
-        [file] if file.is_file() => Some(digest(file)?),
-        _ => None,
-    };
+    let reference = file_digest(&places.staged);
+    record.reference.file_sha256 =
+        Some(reference.map_err(|e| file_error(Action::Reading, &places.staged, e))?);
+    record.copy.file_sha256 =
+        digest_of_only_file(folder).map_err(|e| file_error(Action::Reading, folder, e))?;
     Ok(Recorded::Fingerprint(record))
 }
 

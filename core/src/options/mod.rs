@@ -80,6 +80,16 @@ impl Options {
         })
     }
 
+    /// Parses name-value pairs as [`Options::parse`] does, for marks of recipients that are named
+    /// elsewhere.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Options::parse`].
+    pub fn parse_for_recipients<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
+        let anybody = ("RECIPIENT", "-");
+        Ok(Options { subject: None, ..Options::parse(pairs.into_iter().chain([anybody]))? })
+    }
+
     /// Returns the value of an option in its one canonical spelling, which parses to it: equal
     /// texts are equal values. `None` where the option is not given.
     ///
@@ -171,6 +181,9 @@ mod tests {
         for of_message in [("CODE", "LDPC"), ("CODE", "REPETITION"), ("CHIP_RATE", "1")] {
             assert_eq!(coefficients(&[recipient, of_message]), None, "{of_message:?}");
         }
+        let elsewhere = |pairs: &[_]| Options::parse_for_recipients(pairs.iter().copied()).unwrap();
+        assert_eq!((elsewhere(&[]).coefficients, elsewhere(&[]).subject), (Some(COEFFICIENTS), None));
+        assert_eq!(elsewhere(&[("CODE", "LDPC")]).coefficients, None);
         assert_eq!([coefficients(&[]), coefficients(&[("MESSAGE", "00")])], [None; 2]);
     }
 

@@ -37,7 +37,7 @@ pub(super) enum Subcommands {
     /// Write a marked copy of a map, and its record, for every recipient of a list
     ///
     /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears
-    /// when it is complete, was read back and carries its message; the same command again skips
+    /// when it is complete, was read back and carries its mark; the same command again skips
     /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable map, 6 too
     /// large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),

@@ -116,7 +116,7 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
 fn run_distribute(args: DistributeArgs) -> Result<()> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let request = distribute::DistributeRequest {
-        options: Options::parse(flags)?,
+        options: Options::parse_for_recipients(flags)?,
         key: texts::key(&args.key)?,
         map: args.map,
         recipients: args.recipients,

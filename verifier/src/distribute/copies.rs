@@ -4,10 +4,12 @@ use super::opening::open;
 use crate::{Error, Result};
 use gdal::vector::LayerAccess;
 use meshmark_core::{
+    fingerprint_record::FingerprintRecord,
     key::SecretKey,
     message::Message,
     options::{Options, Subject},
     record::{Record, Reference},
+    recorded::Recorded,
 };
 use meshmark_dataset::{Survey, formats::Format, marking};
 use sha2::{Digest, Sha256};
@@ -86,10 +88,23 @@ impl MarkedCopy {
     /// Compares everything that is determined before the marking.
     fn is_record_of_this(&self, options: &Options, key: &SecretKey, reference: &Reference) -> bool {
         let text = fs::read_to_string(&self.record).ok();
-        let Some(found) = text.and_then(|text| Record::from_json(&text).ok()) else { return false };
-        let reference = Reference { patches: found.reference.patches, ..reference.clone() };
-        let expected = marking::record(options, &self.subject(), key, reference, found.distortion());
-        Record { software: found.software.clone(), ..expected } == found
+        let Some(found) = text.and_then(|text| Recorded::from_json(&text).ok()) else { return false };
+        let (patches, distortion) = match &found {
+            Recorded::Message(record) => (record.reference.patches, record.distortion()),
+            Recorded::Fingerprint(record) => (record.parts[0].patches, record.distortion),
+        };
+        let reference = Reference { patches, ..reference.clone() };
+        match (marking::recorded(options, &self.subject(), key, reference, distortion), found) {
+            (Recorded::Message(expected), Recorded::Message(found)) => {
+                Record { software: found.software.clone(), ..expected } == found
+            }
+            (Recorded::Fingerprint(mut expected), Recorded::Fingerprint(found)) => {
+                expected.reference.file_sha256.clone_from(&found.reference.file_sha256);
+                let (software, copy) = (found.software.clone(), found.copy.clone());
+                FingerprintRecord { software, copy, ..expected } == found
+            }
+            _ => false,
+        }
     }
 
     /// Returns a file whose name makes it a part of the copy, if there is one.

@@ -12,6 +12,7 @@
 mod copies;
 mod flatgeobuf;
 mod geojson;
+mod marks;
 mod moving;
 mod ogr2ogr;
 mod opening;
@@ -27,9 +28,10 @@ pub use request::DistributeRequest;
 
 use crate::{Error, Result, inputs::maps, progress::Progress};
 use copies::MarkedCopy;
-use meshmark_core::{embedding::Embedding, key::RECIPIENT_BITS, options::Spelling};
+use marks::Marks;
+use meshmark_core::options::Spelling;
 use meshmark_dataset::{
-    Survey, ThreadPool,
+    Survey, ThreadPool, file_digest,
     formats::Format,
     marking::{self, Unmarked},
     threads,
@@ -118,28 +120,29 @@ fn run(
     let pool = ThreadPool::new(threads, || (), || ());
     let pool = pool.map_err(|source| Error::Threads { source })?;
     progress.start("patches", 0);
-    let embedding = pool.install(|| Embedding::new(&map, key, RECIPIENT_BITS, parameters)?.for_many())?;
-    let message = copies[0].carried(key);
-    let warnings = marking::warnings(options, Some(&message), survey, embedding.patches(), Spelling::Flag);
+    let marks = pool.install(|| Marks::new(&map, key, options))?;
+    let message = options.coefficients.is_none().then(|| copies[0].carried(key));
+    let warnings = marking::warnings(options, message.as_ref(), survey, marks.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
-    let reference = marking::reference(survey, embedding.patches());
+    let reference = marking::reference(survey, marks.patches());
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
     let unmarked = pool.install(|| Unmarked::new(geometries, &map));
     let vertices = &survey.data.vertices;
     let warnings = Mutex::default();
-    let job = Job { key, options, vertices, unmarked, reference, format, stage, folder, warnings };
+    let map_sha256 = digest_of(&request.map)?;
+    let job =
+        Job { key, options, vertices, unmarked, reference, map_sha256, format, stage, folder, warnings };
     let mut written = 0;
-    for batch in copies.chunks(embedding.batch()) {
-        progress.start("solving patches", embedding.patches() as u64);
-        let messages: Vec<_> = batch.iter().map(|copy| copy.carried(key)).collect();
-        let wanted = pool.install(|| embedding.wanted(&messages, &progress.stepper()))?;
+    for batch in copies.chunks(marks.batch()) {
+        progress.start("solving patches", marks.patches() as u64);
+        let wanted = pool.install(|| marks.wanted(batch, &progress.stepper()))?;
         progress.start("writing copies", batch.len() as u64);
         let step = progress.stepper();
-        let todo = Mutex::new(batch.iter().zip(messages).zip(wanted));
+        let todo = Mutex::new(batch.iter().zip(wanted));
         let write_next = || {
             let next = todo.lock().expect("nobody panics with it").next();
-            next.map(|((copy, message), wanted)| {
-                let marked = pool.install(|| embedding.settle(&message, &wanted)).map_err(Error::from);
+            next.map(|(copy, wanted)| {
+                let marked = pool.install(|| marks.settle(copy, &wanted)).map_err(Error::from);
                 drop(wanted);
                 let written = marked.and_then(|marked| {
                     let distortion = pool.install(|| job.unmarked.distortion(&marked, parameters));
@@ -157,6 +160,12 @@ fn run(
     }
     job.warnings.into_inner().expect("nobody panics with them").iter().for_each(|text| warn(text));
     Ok(())
+}
+
+/// Returns the digest of a map that is one file.
+fn digest_of(map: &Path) -> Result<Option<String>> {
+    let failed = |source| Error::Undigested { path: map.into(), source };
+    map.is_file().then(|| file_digest(map).map_err(failed)).transpose()
 }
 
 /// Calls `step` on this many threads until it returns `None`, and returns the number of successes.

@@ -10,10 +10,11 @@ use meshmark_core::{
     key::SecretKey,
     options::Options,
     record::{Distortion, Reference},
+    recorded::Recorded,
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Action, Error as MapError, file_error,
+    Action, Error as MapError, digest_of_only_file, file_error,
     formats::Format,
     marking::{self, Moves, Unmarked},
     publication::{Move, Publication},
@@ -29,6 +30,8 @@ pub struct Job<'a> {
     pub vertices: &'a VertexTable,
     pub unmarked: Unmarked<'a>,
     pub reference: Reference,
+    /// The digest of the map, where it is one file.
+    pub map_sha256: Option<String>,
     pub format: &'static Format,
     pub stage: &'a Stage,
     pub folder: &'a Path,
@@ -51,8 +54,19 @@ pub fn write(job: &Job, copy: &MarkedCopy, moved: &[[f64; 2]], distortion: Disto
     }
     check(job, &file, moves)?;
     let reference = job.reference.clone();
-    let record = marking::record(job.options, &copy.subject(), job.key, reference, distortion);
+    let record = marking::recorded(job.options, &copy.subject(), job.key, reference, distortion);
+    let record = with_digests(record, job, &folder)?;
     publish(copy, &workplace, &folder, &record.to_json(), job.format)
+}
+
+/// Returns the record with the digests of the map and, where it is one file, of the copy in
+/// `folder`.
+fn with_digests(record: Recorded, job: &Job, folder: &Path) -> Result<Recorded> {
+    let Recorded::Fingerprint(mut record) = record else { return Ok(record) };
+    record.reference.file_sha256 = job.map_sha256.clone();
+    record.copy.file_sha256 =
+        digest_of_only_file(folder).map_err(|error| file_error(Action::Reading, folder, error))?;
+    Ok(Recorded::Fingerprint(record))
 }
 
 /// Checks that the file holds the features of the staged map, moved, within the precision of its
@@ -101,7 +115,13 @@ fn publish(
     if !is_there {
         let staged = workplace.folder().join("record.json");
         fs::write(&staged, record).map_err(|error| file_error(Action::Writing, &staged, error))?;
-        publication.companions.push(Move { from: staged, to: place(copy.record.file_name()) });
+        let to = place(copy.record.file_name());
+        // The record of a copy that is no longer there has the digest of that one.
+        if to.exists() {
+            let away = workplace.folder().join("old_record.json");
+            publication.retired.push(Move { from: to.clone(), to: away });
+        }
+        publication.companions.push(Move { from: staged, to });
     }
     let entries = fs::read_dir(folder).map_err(|error| file_error(Action::Reading, folder, error))?;
     for entry in entries.flatten() {
