@@ -99,7 +99,7 @@ fn bytes_and_indexes_agree(host: &Host, copy: &str, driver: &str) {
 
 /// Returns a record without the digests of its files, of which that of the copy must be right: a
 /// copy that is not one file, or that another program writes, has none.
-fn record(host: &Host, record: &str, copy: &str) -> Value {
+fn without_digests(host: &Host, record: &str, copy: &str) -> Value {
     let mut record: Value = serde_json::from_slice(&fs::read(host.path(record)).unwrap()).unwrap();
     let of_copy = record["copy"]["file_sha256"].take();
     match copy {
@@ -122,7 +122,10 @@ fn records_and_geopackages_are_those_of_the_driver() {
             ["-oo", "KEY=key.json", "-oo", &subject, "-oo", "AMPLITUDE=0.12", "-oo", "RECORD=driver.json"];
         let line = [&["-f", "GPKG", "driver.gpkg", "MESHMARK:map.gpkg"], &options[..]].concat();
         host.run("ogr2ogr", &line).succeeds();
-        assert_eq!(record(&host, &format!("out/{stem}.json"), &copy), record(&host, "driver.json", ""));
+        assert_eq!(
+            without_digests(&host, &format!("out/{stem}.json"), &copy),
+            without_digests(&host, "driver.json", "")
+        );
         assert!(contents::read(&host.path(&copy)) == contents::read(&host.path("driver.gpkg")));
         assert_eq!(summary(&host, &copy), summary(&host, "driver.gpkg"));
         bytes_and_indexes_agree(&host, &copy, "driver.gpkg");
@@ -166,7 +169,7 @@ fn one_layer_goes_into_every_format_as_by_the_driver() {
         .succeeds();
         let copy = if ending == "shp" { String::new() } else { format!("{ending}/{stem}.{ending}") };
         let [ours, driver_s] = [format!("{ending}/{stem}.json"), format!("{ending}.json")];
-        assert_eq!(record(&host, &ours, &copy), record(&host, &driver_s, ""));
+        assert_eq!(without_digests(&host, &ours, &copy), without_digests(&host, &driver_s, ""));
         let features = |name: &str| -> Vec<FeatureContents> {
             let features =
                 contents::read(&host.path(name)).into_iter().flat_map(|layer| layer.features).collect();
