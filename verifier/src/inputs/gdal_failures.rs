@@ -48,9 +48,9 @@ impl error::Error for GdalFailure {
     }
 }
 
-/// Returns GDAL's last error message on this thread since [`forget_failure`].
+/// Returns GDAL's last error message on this thread since the last call or [`forget_failure`].
 pub(crate) fn last_failure() -> Option<String> {
-    LAST_FAILURE.with_borrow(Clone::clone)
+    LAST_FAILURE.take()
 }
 
 /// Discards the failures of earlier operations.

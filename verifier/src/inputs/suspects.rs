@@ -19,8 +19,10 @@ pub struct Suspect {
     /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
     /// in its own; otherwise the numbers of the file.
     pub map: Survey,
-    /// The numbers of the file, where `map` is in the CRS of the reference.
-    pub numbers: Option<Numbers>,
+    /// The numbers of the file.
+    pub numbers: Numbers,
+    /// Whether `map` has these numbers.
+    pub is_raw: bool,
     /// CRS of the layers.
     pub layer_crs: Vec<String>,
     /// The first CRS of a layer.
@@ -40,14 +42,18 @@ pub fn suspect(path: &Path, reference: &Survey) -> Result<Suspect> {
     let numbers = numbers(&dataset, &selection(&WHOLE)).map_err(failed)?;
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
         match numbers.in_crs(target) {
-            Ok(map) => return Ok(Suspect { map, numbers: Some(numbers), layer_crs, crs }),
+            Ok(map) => return Ok(Suspect { map, numbers, is_raw: false, layer_crs, crs }),
             // PROJ fails, or the map exceeds its limits, when the CRS is not that of the
             // coordinates.
-            Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
+            Err(
+                meshmark_dataset::Error::Reprojection { .. }
+                | meshmark_dataset::Error::FewPlaces { .. }
+                | meshmark_dataset::Error::Core(_),
+            ) => {}
             Err(error) => return Err(failed(error)),
         }
     }
-    Ok(Suspect { map: numbers.raw().map_err(failed)?, numbers: None, layer_crs, crs })
+    Ok(Suspect { map: numbers.clone().raw().map_err(failed)?, numbers, is_raw: true, layer_crs, crs })
 }
 
 fn open_suspect(path: &Path) -> Result<Dataset> {

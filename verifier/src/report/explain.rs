@@ -84,6 +84,7 @@ pub(crate) const NOT_TESTED: [&str; 4] = [
 fn found(report: &Report) -> Vec<String> {
     let (v, p) = (&report.vertices, &report.parameters);
     let mut sentences = assumed(report);
+    sentences.extend(left_out(report));
     sentences.push(format!(
         "{} of the {} reference vertices have a counterpart within {} m{}, the suspect being brought onto the reference \
          by {}{}.",
@@ -125,6 +126,12 @@ pub(crate) fn assumed(report: &Report) -> Vec<String> {
             .into()
     });
     read_as.into_iter().chain(polynomial).collect()
+}
+
+/// Returns a sentence about what the suspect has that was not compared.
+pub(crate) fn left_out(report: &Report) -> Option<String> {
+    let faults = report.left_out.to_text()?;
+    Some(format!("What cannot be read or has no place on the Earth was left out: {faults}."))
 }
 
 pub(crate) fn probabilities(report: &Report) -> Vec<String> {

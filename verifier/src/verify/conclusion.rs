@@ -61,6 +61,7 @@ pub fn conclude(
         code,
         registration: seen.registration.clone(),
         vertices: seen.vertices,
+        left_out: seen.left_out.clone().into(),
         parameters: report_parameters(request, seen),
         seconds: Some(seconds.clone()),
         provenance: None,

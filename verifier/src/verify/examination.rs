@@ -15,7 +15,7 @@ use crate::{
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
 use meshmark_core::demodulation::Demodulation;
-use meshmark_dataset::{CoordinateSystem, Survey};
+use meshmark_dataset::{CoordinateSystem, LeftOut, Survey};
 use meshmark_detection::{
     Demodulated, Matched, Observations, Reference,
     decision::{Decision, Decoys, Expected, decide_among},
@@ -31,6 +31,8 @@ pub struct Examination {
     pub registration: Registration,
     /// Numbers of vertices of the two maps.
     pub vertices: VertexCounts,
+    /// What the suspect has that was left out.
+    pub left_out: LeftOut,
     /// Digest of the vertices of the reference.
     pub reference_digest: String,
     /// CRS of the reference.
@@ -131,7 +133,8 @@ pub fn examine(
         Err(error) => return Ok(unfit(error.into())),
     };
     let crs = reference.crs.as_ref();
-    Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, demodulated), registration, crs) }))
+    let seen = seen(request, (&matched, demodulated), registration, crs);
+    Ok(Suited::Yes(Examination { suspect_crs, left_out: suspect.left_out, ..seen }))
 }
 
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
@@ -154,7 +157,7 @@ fn register(
         registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
     };
     let maps_of_features = maps_of_features(&reference.data, &compared.ground, &suspect.map.data)?;
-    if request.registration == Start::Auto && suspect.numbers.is_some() {
+    if request.registration == Start::Auto && !suspect.is_raw {
         let in_place = |map| registrar_of(map).refine_in_place(&suspect.map.data);
         if let Some(registration) = maps_of_features.iter().map(in_place).find(Registration::agrees) {
             return Ok(Registered { map: suspect.map, registration });
@@ -217,6 +220,7 @@ fn seen(
         reference_digest: reference.digest(),
         crs: crs.map(|crs| crs.brief_name()),
         suspect_crs: Vec::new(),
+        left_out: LeftOut::default(),
         radius,
         found,
         observations,
