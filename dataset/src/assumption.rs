@@ -1,7 +1,7 @@
 //! Assumptions about maps whose CRS is missing or wrong: the CRS that their coordinates may be in,
 //! given the region of the earth where they should lie.
 
-use crate::{CoordinateSystem, Result, Survey, crs::reproject};
+use crate::{CoordinateSystem, Survey};
 use meshmark_core::vertices::VertexTable;
 
 /// EPSG codes of projected CRS and their areas of use: code, west, south, east, north in degrees.
@@ -25,21 +25,6 @@ pub struct Assumption {
     pub crs: CoordinateSystem,
     /// Whether x and y are exchanged in the file.
     pub axes_swapped: bool,
-}
-
-impl Assumption {
-    /// Applies the assumption to a map of raw coordinates and reprojects it into the CRS `target`.
-    ///
-    /// # Errors
-    /// Fails for coordinates that cannot be reprojected.
-    pub fn apply(&self, raw: &Survey, target: &CoordinateSystem) -> Result<Survey> {
-        raw.brought(target, |mut coords| {
-            if self.axes_swapped {
-                coords.iter_mut().for_each(|p| p.swap(0, 1));
-            }
-            reproject(&mut coords, Some(&self.crs), target, "of any name").map(|()| coords)
-        })
-    }
 }
 
 /// A part of the earth, in degrees on the datum of some CRS.

@@ -3,6 +3,7 @@
 use crate::{
     Error, Result,
     extent::Extent,
+    left_out::{Faults, is_there},
     wkb::{self, GeometryFault, Step},
 };
 use gdal::vector::Feature;
@@ -45,6 +46,37 @@ impl Chains {
         self.coords.push(point);
     }
 
+    /// Removes the missing coordinates. What is left of a ring or line is a line on either side of
+    /// each, and the holes of a ring that is not whole are lines.
+    pub(crate) fn close_up(&mut self) {
+        if self.coords.iter().all(is_there) {
+            return;
+        }
+        let Chains { coords, starts, kinds, firsts, others } = std::mem::take(self);
+        self.others = others;
+        let ends = starts.iter().skip(1).map(|&start| start as usize).chain([coords.len()]);
+        let mut firsts = firsts.into_iter().peekable();
+        let mut has_shell = false;
+        for (chain, (end, (&start, &kind))) in ends.zip(starts.iter().zip(&kinds)).enumerate() {
+            while firsts.next_if(|&first| first as usize <= chain).is_some() {
+                self.begin_geometry();
+            }
+            let points = &coords[start as usize..end];
+            let is_whole = points.iter().all(is_there);
+            if kind != Step::Hole {
+                has_shell = is_whole && kind == Step::Shell;
+            }
+            let mut step = if is_whole && has_shell { kind } else { Step::First };
+            for point in points {
+                if is_there(point) {
+                    self.push(step, *point);
+                }
+                step = if is_there(point) { Step::Next } else { Step::First };
+            }
+        }
+        firsts.for_each(|_| self.begin_geometry());
+    }
+
     pub(crate) fn append(&mut self, other: &mut Chains) {
         let (of_starts, offset) = (self.starts.len() as u32, self.coords.len() as u32);
         let geometries = self.firsts.len() as u32;
@@ -57,25 +89,32 @@ impl Chains {
     }
 }
 
-/// Appends the coordinates of one geometry of a feature.
+/// Appends the coordinates of one geometry of a feature. Those that are left out are [missing].
+///
+/// [missing]: crate::left_out::MISSING
 pub(crate) fn read_geometry(
     feature: &Feature,
     column: usize,
     layer: &str,
     (keeps_geometries, extent): (bool, Extent),
+    mut faults: Faults,
     chains: &mut Chains,
 ) -> Result<()> {
     let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
     let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
     let failed = |source: GeometryFault| Error::Geometry { layer: layer.into(), fid: fid(), source };
-    let mut bytes = geometry.iso_wkb().map_err(|error| failed(error.into()))?;
+    let mut bytes = match geometry.iso_wkb() {
+        Ok(bytes) => bytes,
+        Err(error) => return faults.feature(failed(error.into())),
+    };
     if keeps_geometries && !wkb::is_plain(&bytes) {
         chains.others.insert(chains.firsts.len() as u32, bytes.clone());
     }
     chains.begin_geometry();
     let mut visit = |step, point: [f64; 2]| {
-        extent.check(point, layer, fid)?;
-        chains.push(step, point);
+        let kept =
+            extent.check(point, layer, fid).map_or_else(|fault| faults.coordinate(fault), |()| Ok(point));
+        chains.push(step, kept?);
         Ok(point)
     };
     match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
@@ -83,7 +122,7 @@ pub(crate) fn read_geometry(
     }) {
         Ok(()) => Ok(()),
         Err(Visit::Ours(error)) => Err(error),
-        Err(Visit::Wkb(error)) => Err(failed(error.into())),
+        Err(Visit::Wkb(error)) => faults.feature(failed(error.into())),
     }
 }
 
@@ -95,5 +134,33 @@ enum Visit {
 impl From<wkb::WkbError> for Visit {
     fn from(error: wkb::WkbError) -> Self {
         Visit::Wkb(error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::left_out::MISSING;
+
+    #[test]
+    fn a_missing_coordinate_parts_its_line_and_makes_lines_of_its_ring_and_the_holes() {
+        use Step::{First, Hole, Next, Shell};
+        let mut chains = Chains::default();
+        let at = |x: f64| [x, 0.0];
+        for geometry in [
+            &[(First, at(0.0)), (Next, MISSING), (Next, at(1.0)), (Next, at(2.0))][..],
+            &[(Shell, at(3.0)), (Next, at(4.0)), (Next, MISSING), (Hole, at(5.0)), (Next, at(6.0))],
+            &[(Shell, at(7.0)), (Next, at(8.0)), (Hole, MISSING), (Next, at(9.0)), (Hole, at(10.0))],
+            &[(First, MISSING)],
+            &[(Shell, at(11.0)), (Next, at(12.0))],
+        ] {
+            chains.begin_geometry();
+            geometry.iter().for_each(|(step, point)| chains.push(*step, *point));
+        }
+        chains.close_up();
+        assert_eq!(chains.coords, (0..13).map(|x| at(x.into())).collect::<Vec<_>>());
+        assert_eq!(chains.starts, [0, 1, 3, 5, 7, 9, 10, 11]);
+        assert_eq!(chains.kinds, [First, First, First, First, Shell, First, Hole, Shell]);
+        assert_eq!(chains.firsts, [0, 2, 4, 7, 7]);
     }
 }

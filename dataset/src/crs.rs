@@ -1,13 +1,21 @@
 //! Coordinate reference systems: metres per unit, labels, and the traditional axis order
 //! everywhere.
 
-use crate::{Error, Result, crs_wkt as wkt};
+use crate::{
+    Error, Result, crs_wkt as wkt,
+    left_out::{MISSING, is_there},
+};
 use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
 use meshmark_core::{
     ground::Ground,
     scale::{Scale, ScaleLattice},
     vertices::VertexTable,
 };
+
+/// The furthest coordinates that mean a place, in turns around the Earth: maps continue past the date
+/// line, and eastings may begin with the number of their zone.
+const FURTHEST_TURNS: f64 = 10.0;
+const EQUATOR_M: f64 = 40_075_017.0;
 
 /// Names of a CRS without a name.
 const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
@@ -74,26 +82,50 @@ impl CoordinateSystem {
         CoordTransform::new(&self.0, &target.0)
     }
 
+    /// Returns whether coordinates can mean a place in this CRS, and GDAL can transform them: it
+    /// subtracts turn after turn from a longitude, without end where a turn is less than the
+    /// precision of the number.
+    fn can_mean(&self, [x, y]: &[f64; 2]) -> bool {
+        let [most_x, most_y] = match self.0.is_geographic() {
+            true => {
+                [FURTHEST_TURNS * 360.0, 90.0].map(|degrees| degrees / self.0.angular_units().to_degrees())
+            }
+            false => [FURTHEST_TURNS * EQUATOR_M / self.0.linear_units(); 2],
+        };
+        x.abs() <= most_x && y.abs() <= most_y
+    }
+
+    /// Transforms points into another CRS; those without a place in both are then [`MISSING`].
+    fn transform(&self, points: &mut [[f64; 2]], target: &CoordinateSystem) -> gdal::errors::Result<()> {
+        let transform = self.transform_to(target)?;
+        let there: Vec<usize> = (0..points.len()).filter(|&i| self.can_mean(&points[i])).collect();
+        let (mut x, mut y): (Vec<f64>, Vec<f64>) =
+            there.iter().map(|&i| (points[i][0], points[i][1])).unzip();
+        // An error concerns some points only, which are then not finite.
+        let _ = transform.transform_coords(&mut x, &mut y, &mut []);
+        points.fill(MISSING);
+        there.into_iter().zip(x.into_iter().zip(y)).for_each(|(i, (x, y))| points[i] = [x, y]);
+        Ok(())
+    }
+
     /// Converts points to degrees east of Greenwich and north, on the datum of this CRS; `None`
     /// where it has no such place.
     pub(crate) fn degrees(&self, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
-        let (mut x, mut y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
+        let mut places = points.to_vec();
         let Ok(geographic) = self.0.geog_cs().map(CoordinateSystem::new) else {
             return vec![None; points.len()];
         };
-        if !self.0.is_geographic() {
-            let Ok(transform) = self.transform_to(&geographic) else { return vec![None; points.len()] };
-            // An error concerns some points only, which are then not finite.
-            let _ = transform.transform_coords(&mut x, &mut y, &mut []);
+        if !self.0.is_geographic() && self.transform(&mut places, &geographic).is_err() {
+            return vec![None; points.len()];
         }
         let prime_meridian = geographic.0.get_attr_value("PRIMEM", 1).ok().flatten();
         let prime_meridian: f64 = prime_meridian.and_then(|text| text.parse().ok()).unwrap_or(0.0);
         let unit = geographic.0.angular_units().to_degrees();
-        let place = |(x, y): (f64, f64)| {
+        let place = |[x, y]: [f64; 2]| {
             let place = [x * unit + prime_meridian, y * unit];
             (place[0].is_finite() && place[1].abs() <= 90.0).then_some(place)
         };
-        x.into_iter().zip(y).map(place).collect()
+        places.into_iter().map(place).collect()
     }
 
     /// Measures the scales of a map for which the scale of its ground is not exact everywhere.
@@ -227,19 +259,22 @@ pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Res
 }
 
 /// Reprojects coordinates into `target`; those of a layer without a CRS are assumed to be in it.
+/// Those without a place there are then [`MISSING`], and are returned as they were.
 pub(crate) fn reproject(
     coords: &mut [[f64; 2]],
     from: Option<&CoordinateSystem>,
     target: &CoordinateSystem,
     layer: &str,
-) -> Result<()> {
-    let Some(from) = from.filter(|from| !from.is_same(target) && !coords.is_empty()) else { return Ok(()) };
-    let failed = |error: gdal::errors::GdalError| Error::Reprojection { layer: layer.into(), source: error };
-    let (mut x, mut y): (Vec<f64>, Vec<f64>) = coords.iter().map(|p| (p[0], p[1])).unzip();
-    let transform = from.transform_to(target).map_err(failed)?;
-    transform.transform_coords(&mut x, &mut y, &mut []).map_err(failed)?;
-    coords.iter_mut().zip(x.into_iter().zip(y)).for_each(|(p, (x, y))| *p = [x, y]);
-    Ok(())
+) -> Result<Vec<[f64; 2]>> {
+    let given = coords.to_vec();
+    if let Some(from) = from.filter(|from| !from.is_same(target)) {
+        let failed =
+            |error: gdal::errors::GdalError| Error::Reprojection { layer: layer.into(), source: error };
+        from.transform(coords, target).map_err(failed)?;
+    }
+    coords.iter_mut().filter(|point| !target.can_mean(point)).for_each(|point| *point = MISSING);
+    let lost = given.iter().zip(&*coords).filter(|(given, now)| is_there(given) && !is_there(now));
+    Ok(lost.map(|(given, _)| *given).collect())
 }
 
 #[cfg(test)]

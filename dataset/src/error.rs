@@ -22,6 +22,7 @@ pub enum Error {
     Geometry { layer: String, fid: String, source: GeometryFault },
     Unreadable { layer: String, reason: String },
     Reprojection { layer: String, source: GdalError },
+    FewPlaces { layer: String, crs: String },
     TooLarge { most: usize },
     TooSmall { size_m: f64, tolerance_m: f64 },
     UnevenScale { ends: [[f64; 2]; 2], off_percent: f64, crs: String },
@@ -101,6 +102,20 @@ impl From<meshmark_core::Error> for Error {
 }
 
 impl Error {
+    /// Returns the fault of a feature without the remedy.
+    pub(crate) fn fault(&self) -> String {
+        match self {
+            Error::NotFinite { layer, fid, x, y } => format!(
+                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are not finite numbers"
+            ),
+            Error::TooFar { layer, fid, x, y } => format!(
+                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are further away than any place in the \
+                 CRS of the map"
+            ),
+            other => other.to_string(),
+        }
+    }
+
     /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
         let srs = |crs: &str| spelling.value("SRS", crs);
@@ -131,14 +146,9 @@ impl Error {
                     "the CRS {crs} is geocentric, and a map needs a projected or geographic one: reproject first"
                 )
             }
-            Error::NotFinite { layer, fid, x, y } => format!(
-                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are not finite numbers: correct the \
-                 feature, or leave it out"
-            ),
-            Error::TooFar { layer, fid, x, y } => format!(
-                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are further away than any place in the \
-                 CRS of the map: correct the feature, or leave it out"
-            ),
+            Error::NotFinite { .. } | Error::TooFar { .. } => {
+                format!("{}: correct the feature, or leave it out", self.fault())
+            }
             Error::Geometry { layer, fid, source } => format!("layer \"{layer}\", feature {fid}: {source}"),
             Error::Unreadable { layer, reason } => {
                 format!("layer \"{layer}\" cannot be read to its end: {reason}")
@@ -147,6 +157,9 @@ impl Error {
                 format!(
                     "coordinates of layer \"{layer}\" cannot be brought into the CRS of the reference: {source}"
                 )
+            }
+            Error::FewPlaces { layer, crs } => {
+                format!("most coordinates of layer \"{layer}\" have no place in {crs}: it is not their CRS")
             }
             Error::TooLarge { most } => format!("the map has more than {most} vertices: cut it into sheets"),
             Error::TooSmall { size_m, tolerance_m } => format!(

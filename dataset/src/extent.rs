@@ -2,7 +2,6 @@
 //! vertices would collapse.
 
 use crate::{CoordinateSystem, Error, Result};
-use meshmark_core::vertices::WIDEST;
 
 /// Beyond a thousand times the width of any map of the Earth a number is coarser than a tenth of a
 /// millimetre.
@@ -16,8 +15,8 @@ const FURTHEST_DEGREES: f64 = 3600.0;
 pub(crate) struct Extent(f64);
 
 impl Extent {
-    /// The widest extent of a mesh.
-    pub(crate) const ANY: Extent = Extent(WIDEST / 2.0);
+    /// The extent of maps in an unknown CRS.
+    pub(crate) const ANY: Extent = Extent(FURTHEST_M);
 
     /// Returns the extent of maps in a CRS. A map without one is in metres.
     pub(crate) fn in_crs(crs: Option<&CoordinateSystem>) -> Self {
@@ -36,9 +35,14 @@ impl Extent {
         if !x.is_finite() || !y.is_finite() {
             return Err(Error::NotFinite { layer: layer.into(), fid: fid(), x, y });
         }
-        match x.abs().max(y.abs()) > self.0 {
-            true => Err(Error::TooFar { layer: layer.into(), fid: fid(), x, y }),
-            false => Ok(()),
+        match self.holds(&[x, y]) {
+            true => Ok(()),
+            false => Err(Error::TooFar { layer: layer.into(), fid: fid(), x, y }),
         }
+    }
+
+    /// Returns whether a coordinate is inside the extent.
+    pub(crate) fn holds(self, [x, y]: &[f64; 2]) -> bool {
+        x.abs() <= self.0 && y.abs() <= self.0
     }
 }

@@ -42,7 +42,7 @@ pub struct Selection<'a> {
     pub geometries: bool,
     /// A map of more vertices, duplicates included, is refused.
     pub most_vertices: usize,
-    /// Returns GDAL's last failure since the walk began, if there was one: drivers end a layer
+    /// Returns GDAL's last failure since the walk began or the last call: drivers end a layer
     /// early on a read error, and only the error handler of the process distinguishes that from the
     /// end of the layer.
     pub last_failure: &'a dyn Fn() -> Option<String>,

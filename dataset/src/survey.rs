@@ -1,11 +1,13 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    CoordinateSystem, Error, Geometries, Result,
+    Assumption, CoordinateSystem, Error, Geometries, Result,
     chains::{Chains, read_geometry},
     crs::{self, reproject},
     extent::Extent,
-    labels, parse_srs, polylines,
+    labels,
+    left_out::{Faults, LeftOut, MISSING, is_there},
+    parse_srs, polylines,
     selection::{LabelFields, Selection, chosen_layers},
     turns::turn,
 };
@@ -22,6 +24,9 @@ use meshmark_core::{
 };
 use std::{collections::BTreeMap, ops::Range};
 
+/// Coordinates of which more than this share has no place in a CRS are in another one.
+const MOST_LOST: f64 = 0.1;
+
 /// A map as marking and verification read it.
 #[derive(Debug, Clone)]
 pub struct Survey {
@@ -37,25 +42,11 @@ pub struct Survey {
     pub geometries: Option<Geometries>,
     /// The number of features of each layer read, by the number of the layer in the dataset.
     pub features: BTreeMap<usize, u64>,
+    /// What is not in the data, of a map that is read with its faults.
+    pub left_out: LeftOut,
 }
 
 impl Survey {
-    /// Returns the same map with all coordinates transformed into another CRS by `bring`.
-    ///
-    /// # Errors
-    /// Returns the errors of `bring`, and fails on a CRS without a metric.
-    pub(crate) fn brought(
-        &self,
-        crs: &CoordinateSystem,
-        bring: impl Fn(Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>>,
-    ) -> Result<Survey> {
-        let data = self.data.moved(bring)?;
-        let ground = crs::ground(Some(crs), &data.vertices)?;
-        let lattice = crs.lattice(&data.vertices, &ground);
-        let (crs, ground, features) = (Some(crs.clone()), Some(ground), self.features.clone());
-        Ok(Survey { data, crs, ground, lattice, geometries: None, features })
-    }
-
     /// Returns the ground metric.
     ///
     /// # Errors
@@ -91,13 +82,16 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     found.survey(crs.and_then(|(_, crs)| crs), selection.geometries)
 }
 
-/// Reads the vertices and the labels of a dataset, whose layers may be in any CRS.
+/// Reads the vertices and the labels of a dataset, whose layers may be in any CRS. Coordinates that
+/// no CRS can mean and features that cannot be read are left out.
 ///
 /// # Errors
-/// Fails on a layer that does not exist or cannot be read to its end, and on coordinates that are
-/// not finite.
+/// Fails on a layer that does not exist or cannot be read to its end.
 pub fn numbers(dataset: &Dataset, selection: &Selection) -> Result<Numbers> {
-    let Walk { found, parts, .. } = Walk::over(dataset, selection, false)?;
+    let Walk { mut found, parts, .. } = Walk::over(dataset, selection, false)?;
+    let points = found.labels.iter_mut().map(|label| &mut label.point);
+    let points = points.chain(found.polylines.iter_mut().flat_map(|line| &mut line.vertices));
+    points.filter(|point| !Extent::ANY.holds(point)).for_each(|point| *point = MISSING);
     Ok(Numbers { found, parts })
 }
 
@@ -109,15 +103,44 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// Returns the map in this CRS; layers without a CRS are assumed to be in it.
+    /// Returns the map in this CRS; layers without a CRS are assumed to be in it. Coordinates
+    /// without a place there are left out.
     ///
     /// # Errors
-    /// Fails on coordinates that cannot be reprojected, and on a CRS without a metric.
+    /// Fails where most coordinates cannot be reprojected, and on a CRS without a metric.
     pub fn in_crs(&self, target: &CoordinateSystem) -> Result<Survey> {
+        self.brought(target, None)
+    }
+
+    /// Returns the map in the CRS `target` as [`Numbers::in_crs`] does, with all numbers in the CRS
+    /// of an assumption.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Numbers::in_crs`].
+    pub fn assumed(&self, assumption: &Assumption, target: &CoordinateSystem) -> Result<Survey> {
+        self.brought(target, Some(assumption))
+    }
+
+    fn brought(&self, target: &CoordinateSystem, assumption: Option<&Assumption>) -> Result<Survey> {
         let mut found = self.found.clone();
         for Part { layer, crs, coords, labels, polylines } in &self.parts {
-            let bring = |points: &mut [[f64; 2]]| reproject(points, crs.as_ref(), target, layer);
-            bring(&mut found.chains.coords[coords.clone()])?;
+            let crs = assumption.map(|assumption| &assumption.crs).or(crs.as_ref());
+            let bring = |points: &mut [[f64; 2]]| {
+                if assumption.is_some_and(|assumption| assumption.axes_swapped) {
+                    points.iter_mut().for_each(|point| point.swap(0, 1));
+                }
+                reproject(points, crs, target, layer)
+            };
+            let lost = bring(&mut found.chains.coords[coords.clone()])?;
+            let crs = || crs.unwrap_or(target).brief_name();
+            if lost.len() as f64 > MOST_LOST * coords.len() as f64 {
+                return Err(Error::FewPlaces { layer: layer.clone(), crs: crs() });
+            }
+            for point in lost {
+                found
+                    .left_out
+                    .coordinate(|| format!("layer \"{layer}\": {point:?} is no place in {}", crs()));
+            }
             let labels = &mut found.labels[labels.clone()];
             let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
             bring(&mut points)?;
@@ -157,13 +180,17 @@ struct Found {
     labels: Vec<Label>,
     polylines: Vec<Polyline>,
     features: BTreeMap<usize, u64>,
+    left_out: LeftOut,
     /// Whether polygons are kept feature by feature.
     keeps_areas: bool,
 }
 
 impl Found {
     fn survey(self, crs: Option<CoordinateSystem>, keeps_geometries: bool) -> Result<Survey> {
-        let Found { mut chains, labels, polylines, features, keeps_areas } = self;
+        let Found { mut chains, mut labels, mut polylines, features, left_out, keeps_areas } = self;
+        chains.close_up();
+        labels.retain(|label| is_there(&label.point));
+        polylines.retain(|line| line.vertices.iter().all(is_there));
         let coords = std::mem::take(&mut chains.coords);
         let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
         let areas = match keeps_areas {
@@ -179,7 +206,7 @@ impl Found {
         let lattice =
             crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&data.vertices, ground));
         let geometries = keeps_geometries.then(|| Geometries::new(indices, chains));
-        Ok(Survey { data, crs, ground, lattice, geometries, features })
+        Ok(Survey { data, crs, ground, lattice, geometries, features, left_out })
     }
 }
 
@@ -219,7 +246,11 @@ impl<'a> Walk<'a> {
                     true => Extent::in_crs(columns[column].as_ref()),
                     false => Extent::ANY, // its true CRS may differ
                 };
-                read_geometry(&feature, column, name, (self.selection.geometries, extent), chains)?;
+                let faults = match self.in_one_crs {
+                    true => Faults::Fail,
+                    false => Faults::LeaveOut(&mut self.found.left_out),
+                };
+                read_geometry(&feature, column, name, (self.selection.geometries, extent), faults, chains)?;
             }
             let vertices = self.found.chains.coords.len()
                 + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
@@ -227,6 +258,9 @@ impl<'a> Walk<'a> {
                 return Err(Error::TooLarge { most: self.selection.most_vertices });
             }
             self.describe(&feature);
+            if !self.in_one_crs {
+                self.leave_out(&feature, name);
+            }
         }
         if let Some(reason) = (self.selection.last_failure)() {
             return Err(Error::Unreadable { layer: name.into(), reason });
@@ -247,6 +281,13 @@ impl<'a> Walk<'a> {
             (first_label, first_polyline) = (self.found.labels.len(), self.found.polylines.len());
         }
         Ok(features)
+    }
+
+    /// Leaves out what GDAL could not read of a feature.
+    fn leave_out(&mut self, feature: &Feature, layer: &str) {
+        let Some(reason) = (self.selection.last_failure)() else { return };
+        let fid = feature.fid().map_or("without id".into(), |fid| fid.to_string());
+        self.found.left_out.feature(|| format!("layer \"{layer}\", feature {fid}: {reason}"));
     }
 
     /// Adds labels and polylines of a feature. Curves have no counterpart in geo and add none.

@@ -24,6 +24,7 @@ use meshmark_host_tests::{
 };
 use meshmark_verifier::{
     Request,
+    inputs::private_copy::PrivateCopy,
     progress::Progress,
     verify::{self, Found, Sought},
 };
@@ -112,7 +113,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     let request = Request {
         key: key.clone(),
         reference: reference.into(),
-        suspect: suspect.into(),
+        suspect: PrivateCopy::of(suspect)?,
         record: None,
         subject: None,
         sought: Sought::Message { bits: 128 },

@@ -136,6 +136,14 @@ pub enum Error {
     Undigested { path: PathBuf, source: io::Error },
     #[error("the suspect {} is not a file here: give a local file", path.display())]
     NoFile { path: PathBuf },
+    #[error(
+        "the suspect {} cannot be copied to {} for its examination ({source}): make room there, or name another folder \
+         by TMPDIR",
+        path.display(), place.display()
+    )]
+    Uncopied { path: PathBuf, place: PathBuf, source: io::Error },
+    #[error("the suspect {} was changed while it was examined: verify it again when nobody writes to it", path.display())]
+    SuspectChanged { path: PathBuf },
     #[error("GDAL takes no option: {source}")]
     NoOption { source: GdalError },
     #[error("the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr", path.display())]
@@ -238,6 +246,7 @@ impl Error {
             | Unmeasured { .. }
             | Undigested { .. }
             | NoFile { .. }
+            | SuspectChanged { .. }
             | NoOption { .. }
             | OtherTables { .. }
             | Unread { .. }
@@ -245,7 +254,7 @@ impl Error {
             | StagedUnread { .. }
             | Ogr2ogr { .. }
             | MapChanged => ExitCode::Unreadable,
-            Unwritten { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
+            Unwritten { .. } | Uncopied { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
             Copy { source, .. } | Stopped { source, .. } => source.exit_code(),
             _ => ExitCode::Usage,
         }

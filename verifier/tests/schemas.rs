@@ -396,7 +396,8 @@ fn equal_input_makes_equal_decoys() {
 #[test]
 fn wrong_reports_are_refused() {
     let report = report_and_warnings("marked map", &["--records", "vectors"]).0;
-    let objects = ["", "/code", "/registration", "/vertices", "/parameters", "/decoys", "/candidates"];
+    let objects =
+        ["", "/code", "/registration", "/vertices", "/left_out", "/parameters", "/decoys", "/candidates"];
     assert_closed("report", &report, &objects);
     assert_closed("report", &report, &["/candidates/list/0"]);
     let changes = [
@@ -432,6 +433,8 @@ fn wrong_reports_are_refused() {
             json!({ "centre": [0, 0], "scale": 0, "x": vec![0; 10], "y": vec![0; 10] }),
         ),
         ("/vertices/matched", json!(1.5)),
+        ("/left_out/features", json!(-1)),
+        ("/left_out/named", json!([""])),
         ("/parameters/demodulator", json!("best")),
         ("/parameters/significance", json!(1)),
         ("/parameters/radius_m", json!(0)),

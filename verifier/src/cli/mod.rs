@@ -12,7 +12,7 @@ use meshmark_verifier::{
     Error, ExitCode, Result,
     compare::{Comparison, compare, detail::ComparedFiles},
     distribute, html,
-    inputs::{digests::Digests, gdal_failures, texts, versions::versions},
+    inputs::{digests::Digests, gdal_failures, private_copy::PrivateCopy, texts, versions::versions},
     outputs::{EvidenceMapFile, Format, ReportFile},
     progress::Progress,
     report::{self, Provenance, Report},
@@ -137,10 +137,11 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     let wanted = args.explain || file.is_some();
     let references = args.reference.clone();
-    let digest = || Digests::read(&args.key, &references, &args.suspect, args.record.as_deref());
+    let suspect = PrivateCopy::of(&args.suspect)?;
+    let digest = || Digests::read(&args.key, &references, &suspect, args.record.as_deref());
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
-    let request = request(args)?;
+    let request = request(args, suspect.clone())?;
     let mut progress = Progress::default();
     let mut report = match &records {
         Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,

@@ -9,12 +9,12 @@ use meshmark_core::{
 use meshmark_detection::{Demodulator, matching::RadiusChoice};
 use meshmark_verifier::{
     Error, Request, Result,
-    inputs::texts,
+    inputs::{private_copy::PrivateCopy, texts},
     verify::{Sought, check_key},
 };
 
 /// Combines key, record and flags.
-pub(super) fn request(args: VerifyArgs) -> Result<Request> {
+pub(super) fn request(args: VerifyArgs, suspect: PrivateCopy) -> Result<Request> {
     let key = texts::key(&args.key)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
@@ -45,7 +45,7 @@ pub(super) fn request(args: VerifyArgs) -> Result<Request> {
         subject: options.subject,
         key,
         reference: args.reference.into_iter().next().expect("one is required"),
-        suspect: args.suspect,
+        suspect,
         record,
         parameters: options.parameters,
         layers: options.layers,

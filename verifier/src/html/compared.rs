@@ -35,7 +35,7 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
     let map = |vertices: usize, crs: &str| html! { (count(vertices)) " vertices, " (crs) };
     let reference_crs = report.parameters.crs.as_deref().unwrap_or("no CRS");
     table(&[
-        ("Suspect", Some(file(&inputs.suspect, &map(v.suspect, &crs)))),
+        ("Suspect", Some(html! { (file(&inputs.suspect, &map(v.suspect, &crs))) br; (explain::UNTOUCHED) })),
         ("Reference", Some(file(&inputs.reference, &map(v.reference, reference_crs)))),
         ("Key", Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } }))),
         ("Record", Some(record(report, inputs.record.as_ref()))),

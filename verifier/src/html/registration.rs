@@ -20,7 +20,7 @@ pub fn registration(report: &Report) -> Markup {
     let alignment = report.evidence.as_ref().filter(|_| is_found).map(|e| &e.sketch.alignment);
     let content = html! {
         p {
-            @for text in explain::assumed(report) { (sentence(&text)) }
+            @for text in explain::assumed(report).into_iter().chain(explain::left_out(report)) { (sentence(&text)) }
             @if is_found {
                 "The suspect was brought onto the reference " (method) ", without the key. What is left between matched vertices is "
                 @if report.verdict == Verdict::Match { "the mark, and whatever else moved them." }

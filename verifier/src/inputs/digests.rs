@@ -1,8 +1,9 @@
 //! The files of a verification and their digests.
 
+use super::{belonging_files::files_of, private_copy::PrivateCopy};
 use crate::{Error, Result, words::printable};
 use meshmark_core::hex;
-use meshmark_dataset::{file_digest, workplace::folder_of};
+use meshmark_dataset::file_digest;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::{
@@ -37,7 +38,7 @@ pub struct Digested {
 pub struct Digests<'a> {
     key: Digested,
     references: Vec<(&'a Path, Digested)>,
-    suspect: Digested,
+    suspect: (&'a PrivateCopy, Digested),
     record: Option<Digested>,
 }
 
@@ -49,14 +50,14 @@ impl<'a> Digests<'a> {
     pub fn read(
         key: &Path,
         references: &'a [PathBuf],
-        suspect: &Path,
+        suspect: &'a PrivateCopy,
         record: Option<&Path>,
     ) -> Result<Self> {
         let references = references.iter().map(|path| Ok((path.as_path(), digest(path)?)));
         Ok(Digests {
             key: digest(key)?,
             references: references.collect::<Result<_>>()?,
-            suspect: digest(suspect)?,
+            suspect: (suspect, of_copy(suspect)?),
             record: record.map(digest).transpose()?,
         })
     }
@@ -64,14 +65,24 @@ impl<'a> Digests<'a> {
     /// Returns the files of a verification with this reference, and with this one of many records.
     ///
     /// # Errors
-    /// Fails when that record is no longer readable.
+    /// Fails when that record is no longer readable, and when the suspect is no longer what was
+    /// examined.
     pub fn of_verification(self, reference: &Path, best_record: Option<&Path>) -> Result<Inputs> {
-        let Digests { key, references, suspect, record } = self;
+        let Digests { key, references, suspect: (suspect, examined), record } = self;
+        if digest(suspect.original())? != examined {
+            return Err(Error::SuspectChanged { path: suspect.original().into() });
+        }
         let best_record = best_record.map(digest).transpose()?;
         let reference = references.into_iter().find(|(path, _)| *path == reference);
         let (_, reference) = reference.expect("the verification has one of the references");
-        Ok(Inputs { key, reference, suspect, record: record.or(best_record) })
+        Ok(Inputs { key, reference, suspect: examined, record: record.or(best_record) })
     }
+}
+
+/// Returns the digest of what is examined, before anything has read it.
+fn of_copy(suspect: &PrivateCopy) -> Result<Digested> {
+    let path = printable(&suspect.original().display().to_string());
+    Ok(Digested { path, ..digest(suspect.copy())? })
 }
 
 /// Returns the SHA-256 of a file. For a folder with all in it, or a file with companions of the same name, it is
@@ -82,13 +93,12 @@ pub(crate) fn digest(path: &Path) -> Result<Digested> {
     let files = files_of(path).map_err(failed)?;
     let digest = match files.as_slice() {
         [] => "it is not a local file, so it has no digest".into(),
-        [file] if file == path => format!("SHA-256 {}", file_digest(file).map_err(failed)?),
+        [file] if file.path == path => format!("SHA-256 {}", file_digest(path).map_err(failed)?),
         files => {
             let mut list = String::new();
-            let folder = if path.is_dir() { path } else { folder_of(path) };
             for file in files {
-                let name = file.strip_prefix(folder).unwrap_or(file).to_string_lossy();
-                let _ = writeln!(list, "{}  {name}", file_digest(file).map_err(failed)?);
+                let digest = file_digest(&file.path).map_err(failed)?;
+                let _ = writeln!(list, "{digest}  {}", file.name.to_string_lossy());
             }
             format!(
                 "SHA-256 {} of the sha256sum list of its {} files",
@@ -98,45 +108,6 @@ pub(crate) fn digest(path: &Path) -> Result<Digested> {
         }
     };
     Ok(Digested { path: shown, digest })
-}
-
-/// Extensions of formats that consist of several files with the same name.
-const WITH_COMPANIONS: &[&str] = &["shp", "shx", "dbf", "tab", "mif"];
-
-/// Returns the files of a map, sorted.
-fn files_of(path: &Path) -> io::Result<Vec<PathBuf>> {
-    if path.is_file() {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        if !WITH_COMPANIONS.contains(&extension.as_str()) {
-            return Ok(vec![path.into()]);
-        }
-    } else if !path.is_dir() {
-        return Ok(Vec::new());
-    }
-    let mut files = Vec::new();
-    if path.is_dir() {
-        collect(path, &mut files)?;
-    } else {
-        for entry in folder_of(path).read_dir()? {
-            let file = entry?.path();
-            files.extend(Some(file).filter(|file| file.is_file() && file.file_stem() == path.file_stem()));
-        }
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// Appends the files of a folder and of the folders in it. Links to folders are not followed.
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
-    for entry in folder.read_dir()? {
-        let entry = entry?;
-        if entry.file_type()?.is_dir() {
-            collect(&entry.path(), files)?;
-        } else if entry.path().is_file() {
-            files.push(entry.path());
-        }
-    }
-    Ok(())
 }
 
 fn text_digest(bytes: &[u8]) -> String {

@@ -1,11 +1,13 @@
 //! GDAL's failure messages: kept, and included in the messages of this crate.
 
 use gdal::errors::GdalError;
-use std::{cell::RefCell, error, fmt};
+use std::{cell::RefCell, error, fmt, path::Path};
 
 thread_local! {
     /// Keeps GDAL's last error message on this thread.
     static LAST_FAILURE: RefCell<Option<String>> = const { RefCell::new(None) };
+    /// The path of the copy that GDAL reads on this thread, and the one that its messages name instead.
+    static COPY: RefCell<Option<[String; 2]>> = const { RefCell::new(None) };
 }
 
 /// Keeps GDAL from printing, and keeps its messages for this crate. Call it once, before any other
@@ -13,9 +15,28 @@ thread_local! {
 pub fn quieten_gdal() {
     gdal::config::set_error_handler(|kind, _, message| {
         if matches!(kind, gdal::errors::CplErrType::Failure | gdal::errors::CplErrType::Fatal) {
-            LAST_FAILURE.set(Some(message.to_string()));
+            let named = COPY.with_borrow(|copy| {
+                let [copy, original] = copy.as_ref()?;
+                Some(message.replace(copy, original))
+            });
+            LAST_FAILURE.set(Some(named.unwrap_or_else(|| message.to_string())));
         }
     });
+}
+
+/// Lets GDAL's messages name the original in place of the copy while the result lives.
+pub(super) fn named_as(original: &Path, copy: &Path) -> Names {
+    COPY.set(Some([copy, original].map(|path| path.to_string_lossy().into_owned())));
+    Names
+}
+
+/// The end of the names of [`named_as`].
+pub(super) struct Names;
+
+impl Drop for Names {
+    fn drop(&mut self) {
+        COPY.set(None);
+    }
 }
 
 /// A failure of a function of GDAL. Its message on this thread is more exact than the error of the
@@ -48,9 +69,9 @@ impl error::Error for GdalFailure {
     }
 }
 
-/// Returns GDAL's last error message on this thread since [`forget_failure`].
+/// Returns GDAL's last error message on this thread since the last call or [`forget_failure`].
 pub(crate) fn last_failure() -> Option<String> {
-    LAST_FAILURE.with_borrow(Clone::clone)
+    LAST_FAILURE.take()
 }
 
 /// Discards the failures of earlier operations.

@@ -1,9 +1,11 @@
 //! Inputs: maps, suspects, keys and records, read with errors that name the file, the digests of
 //! the files, and the versions of the programs that read them.
 
+mod belonging_files;
 pub mod digests;
 pub mod gdal_failures;
 pub mod maps;
+pub mod private_copy;
 mod suspect_formats;
 pub mod suspects;
 mod svg;

@@ -1,8 +1,9 @@
 //! Suspects, which may be manipulated: only local files of plain formats are read, without network.
 
 use super::{
-    gdal_failures::{GdalFailure, forget_failure},
+    gdal_failures::{GdalFailure, forget_failure, named_as},
     maps::{Reading, failed, first_crs, open_with, selection},
+    private_copy::PrivateCopy,
     suspect_formats, svg, tables,
 };
 use crate::{Cause, Error, Result, words::printable};
@@ -19,8 +20,10 @@ pub struct Suspect {
     /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
     /// in its own; otherwise the numbers of the file.
     pub map: Survey,
-    /// The numbers of the file, where `map` is in the CRS of the reference.
-    pub numbers: Option<Numbers>,
+    /// The numbers of the file.
+    pub numbers: Numbers,
+    /// Whether `map` has these numbers.
+    pub is_raw: bool,
     /// CRS of the layers.
     pub layer_crs: Vec<String>,
     /// The first CRS of a layer.
@@ -32,39 +35,42 @@ const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields
 
 /// Reads the suspect in the CRS of the reference, where both are known. Where reprojection fails,
 /// the coordinates stay unchanged.
-pub fn suspect(path: &Path, reference: &Survey) -> Result<Suspect> {
-    let dataset = open_suspect(path)?;
+pub fn suspect(suspect: &PrivateCopy, reference: &Survey) -> Result<Suspect> {
+    let _names = named_as(suspect.original(), suspect.copy());
+    let dataset = open_suspect(suspect)?;
     let (layer_crs, crs) = (crs_of(&dataset), first_crs(&dataset));
-    let failed = |error| failed("suspect", path, error);
+    let failed = |error| failed("suspect", suspect.original(), error);
     forget_failure();
     let numbers = numbers(&dataset, &selection(&WHOLE)).map_err(failed)?;
     if let (Some(target), Some(_)) = (&reference.crs, &crs) {
         match numbers.in_crs(target) {
-            Ok(map) => return Ok(Suspect { map, numbers: Some(numbers), layer_crs, crs }),
+            Ok(map) => return Ok(Suspect { map, numbers, is_raw: false, layer_crs, crs }),
             // PROJ fails, or the map exceeds its limits, when the CRS is not that of the
             // coordinates.
-            Err(meshmark_dataset::Error::Reprojection { .. } | meshmark_dataset::Error::Core(_)) => {}
+            Err(
+                meshmark_dataset::Error::Reprojection { .. }
+                | meshmark_dataset::Error::FewPlaces { .. }
+                | meshmark_dataset::Error::Core(_),
+            ) => {}
             Err(error) => return Err(failed(error)),
         }
     }
-    Ok(Suspect { map: numbers.raw().map_err(failed)?, numbers: None, layer_crs, crs })
+    Ok(Suspect { map: numbers.clone().raw().map_err(failed)?, numbers, is_raw: true, layer_crs, crs })
 }
 
-fn open_suspect(path: &Path) -> Result<Dataset> {
-    if !path.is_file() && !path.is_dir() {
-        return Err(Error::NoFile { path: path.into() });
-    }
+fn open_suspect(suspect: &PrivateCopy) -> Result<Dataset> {
+    let (path, copy) = (suspect.original(), suspect.copy());
     forbid_network().map_err(|source| Error::NoOption { source })?;
-    check_table(path)?;
+    check_table(suspect)?;
     suspect_formats::check(path)?;
-    if svg::is_named(path) {
-        return svg::open(path);
+    if svg::is_named(copy) {
+        return svg::open(copy, path);
     }
-    let place = highest_zoom(path).unwrap_or_else(|| path.into());
+    let place = highest_zoom(copy).unwrap_or_else(|| copy.into());
     let dataset = open_plain(&place, &[]).map_err(|failure| suspect_formats::unopened(path, failure))?;
-    check_plain(path, &dataset)?;
+    check_plain(suspect, &dataset)?;
     if dataset.driver().short_name() == "CSV" && tables::is_without_geometry(&dataset) {
-        return open_table(path, &dataset);
+        return open_table(suspect, &dataset);
     }
     Ok(dataset)
 }
@@ -74,10 +80,11 @@ fn open_plain(path: &Path, options: &[String]) -> std::result::Result<Dataset, G
 }
 
 /// Opens a table again, with the columns of its coordinates.
-fn open_table(path: &Path, table: &Dataset) -> Result<Dataset> {
+fn open_table(suspect: &PrivateCopy, table: &Dataset) -> Result<Dataset> {
+    let path = suspect.original();
     let options =
         tables::open_options(table).ok_or_else(|| suspect_formats::table_without_coordinates(path))?;
-    open_plain(path, &options).map_err(|failure| suspect_formats::unopened(path, failure))
+    open_plain(suspect.copy(), &options).map_err(|failure| suspect_formats::unopened(path, failure))
 }
 
 /// Returns the folder of the highest zoom of a folder of tiles, named z/x/y.pbf.
@@ -104,6 +111,7 @@ fn forbid_network() -> gdal::errors::Result<()> {
         ("ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW", "NO"),
         ("OGR_SQLITE_LOAD_EXTENSIONS", ""),
         ("SPATIALITE_SECURITY", "strict"),
+        ("SHAPE_RESTORE_SHX", "YES"), // beside the copy
     ] {
         gdal::config::set_thread_local_config_option(option, value)?;
     }
@@ -111,7 +119,8 @@ fn forbid_network() -> gdal::errors::Result<()> {
 }
 
 /// Refuses MapInfo tables that refer to other tables, which may be anywhere.
-fn check_table(path: &Path) -> Result<()> {
+fn check_table(suspect: &PrivateCopy) -> Result<()> {
+    let path = suspect.copy();
     let is_table = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tab"));
     let tables: Vec<PathBuf> = match path.read_dir() {
         Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| is_table(p)).collect(),
@@ -122,7 +131,7 @@ fn check_table(path: &Path) -> Result<()> {
         let text = String::from_utf8_lossy(&bytes).to_lowercase();
         let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
         if seamless || text.contains("create view") {
-            return Err(Error::OtherTables { path: table.clone() });
+            return Err(Error::OtherTables { path: suspect.original_of(table) });
         }
     }
     Ok(())
@@ -145,11 +154,12 @@ const PLAIN_MODULES: &[&str] = &[
 const VIRTUAL_TABLES: &str = "SELECT name, sql FROM sqlite_master WHERE sql LIKE '%VIRTUAL%USING%'";
 
 /// Refuses a database with virtual tables that take their rows from elsewhere.
-fn check_plain(path: &Path, dataset: &Dataset) -> Result<()> {
+fn check_plain(suspect: &PrivateCopy, dataset: &Dataset) -> Result<()> {
+    let path = suspect.original();
     let failed = |cause: Cause| Error::Unread { path: path.into(), source: Box::new(cause) };
     let tables = match dataset.driver().short_name().as_str() {
         "GPKG" | "SQLite" => virtual_tables(dataset).map_err(|error| failed(error.into()))?,
-        "MBTiles" => virtual_tables_of_tiles(path).map_err(|error| failed(error.into()))?,
+        "MBTiles" => virtual_tables_of_tiles(suspect.copy()).map_err(|error| failed(error.into()))?,
         _ => return Ok(()),
     };
     match tables.into_iter().find(|(_, sql)| !is_plain(sql)) {

@@ -47,9 +47,9 @@ pub(super) fn is_named(path: &Path) -> bool {
 }
 
 /// Reads a drawing as a dataset without CRS.
-pub(super) fn open(path: &Path) -> Result<Dataset> {
+pub(super) fn open(copy: &Path, path: &Path) -> Result<Dataset> {
     let refused = |reason: BadDrawing| suspect_formats::unread_drawing(path, reason);
-    let lines = text(path).and_then(|text| lines(&text)).map_err(refused)?;
+    let lines = text(copy).and_then(|text| lines(&text)).map_err(refused)?;
     dataset(&lines).map_err(|error| Error::Unread { path: path.into(), source: Box::new(error.into()) })
 }
 

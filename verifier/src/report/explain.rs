@@ -52,9 +52,12 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
         Some(record) => format!("The record {} belongs to this key and this reference.", record.path),
         None => "There was no record: how the map was marked was taken from the command line.".into(),
     });
-    sentences.push(format!("File of the suspect: {}.", inputs.suspect.digest));
+    sentences.push(format!("File of the suspect: {}. {UNTOUCHED}", inputs.suspect.digest));
     sentences
 }
+
+/// `Digests::of_verification` fails otherwise.
+pub(crate) const UNTOUCHED: &str = "It was examined as a private copy, and had the same digest afterwards.";
 
 /// Returns sentences about the deposit of key and reference.
 pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
@@ -84,6 +87,7 @@ pub(crate) const NOT_TESTED: [&str; 4] = [
 fn found(report: &Report) -> Vec<String> {
     let (v, p) = (&report.vertices, &report.parameters);
     let mut sentences = assumed(report);
+    sentences.extend(left_out(report));
     sentences.push(format!(
         "{} of the {} reference vertices have a counterpart within {} m{}, the suspect being brought onto the reference \
          by {}{}.",
@@ -133,6 +137,12 @@ pub(crate) fn assumed(report: &Report) -> Vec<String> {
             .into()
     });
     read_as.into_iter().chain(polynomial).collect()
+}
+
+/// Returns a sentence about what the suspect has that was not compared.
+pub(crate) fn left_out(report: &Report) -> Option<String> {
+    let faults = report.left_out.to_text()?;
+    Some(format!("What cannot be read or has no place on the Earth was left out: {faults}."))
 }
 
 pub(crate) fn probabilities(report: &Report) -> Vec<String> {

@@ -17,12 +17,13 @@ pub use explain::explain;
 pub use extent::Extent;
 pub use fingerprint::{FingerprintEntry, PatchAgreement, SignAgreement};
 
-use crate::ExitCode;
+use crate::{ExitCode, words::printable};
 use meshmark_core::{
     code::{Code, Decoder},
     fingerprint_record::FingerprintShape,
     options::Parameters,
 };
+use meshmark_dataset::LeftOut;
 use meshmark_detection::{
     Observations,
     decision::{Decoys, Null, Verdict},
@@ -79,6 +80,8 @@ pub struct Report {
     pub registration: Registration,
     /// Numbers of vertices of the two maps.
     pub vertices: VertexCounts,
+    /// What the suspect has that was left out.
+    pub left_out: Faults,
     /// The assumed parameters of the mark, and those of the test.
     pub parameters: ReportParameters,
     /// Seconds by stage; null in a report file, which is the same for the same input.
@@ -156,6 +159,17 @@ pub enum MarkParameters {
     Fingerprint(FingerprintShape),
 }
 
+/// What the suspect has that cannot be read or placed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Faults {
+    /// Number of coordinate pairs outside all that a CRS can mean.
+    pub coordinates: usize,
+    /// Number of features that cannot be read, or not to their end.
+    pub features: usize,
+    /// The first of these faults.
+    pub named: Vec<String>,
+}
+
 /// The assumed parameters of the mark, and those of the test.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the names are those of the options
@@ -174,6 +188,12 @@ pub struct ReportParameters {
     pub significance: f64,
     pub noise_m: Option<f64>,
     pub software: String,
+}
+
+impl From<LeftOut> for Faults {
+    fn from(LeftOut { coordinates, features, named }: LeftOut) -> Self {
+        Faults { coordinates, features, named: named.iter().map(|fault| printable(fault)).collect() }
+    }
 }
 
 impl Report {

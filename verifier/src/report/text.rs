@@ -1,8 +1,8 @@
 //! The report as a short text.
 
-use super::{Certainty, Report};
+use super::{Certainty, Faults, Report};
 use crate::words::power_of_ten;
-use meshmark_core::code::Decoder;
+use meshmark_core::{code::Decoder, counted};
 use meshmark_detection::{
     Observations,
     decision::{Verdict, shows_key},
@@ -40,6 +40,7 @@ impl Report {
             v.suspect,
             self.read_from()
         ));
+        lines.extend(self.left_out.to_text().map(|faults| format!("left out:     {faults}")));
         lines.push(format!("registration: {}", self.registration.to_text()));
         lines.join("\n") + "\n"
     }
@@ -151,6 +152,20 @@ impl Report {
             Verdict::NoMatch => "NO MATCH",
             Verdict::Inconclusive => "INCONCLUSIVE",
         }
+    }
+}
+
+impl Faults {
+    /// Describes the faults of a suspect that has some.
+    pub(crate) fn to_text(&self) -> Option<String> {
+        let count = |count: usize, what: &str| (count > 0).then(|| counted(count, what));
+        let counts = [count(self.coordinates, "coordinate pair"), count(self.features, "feature")];
+        let counts = counts.into_iter().flatten().collect::<Vec<_>>().join(" and ");
+        let more = match self.coordinates + self.features > self.named.len() {
+            true => "; and more",
+            false => "",
+        };
+        (!counts.is_empty()).then(|| format!("{counts} of the suspect ({}{more})", self.named.join("; ")))
     }
 }
 

@@ -134,6 +134,7 @@ fn report(
         decoys: None,
         registration: seen.registration.clone(),
         vertices: seen.vertices,
+        left_out: seen.left_out.clone().into(),
         parameters: report_parameters(request, seen),
         seconds: Some(seconds.clone()),
         provenance: None,

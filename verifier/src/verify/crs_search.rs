@@ -28,8 +28,7 @@ pub fn register(
     suspect: Suspect,
     start: Start,
 ) -> meshmark_dataset::Result<Registered> {
-    let Suspect { map, numbers, crs, .. } = suspect;
-    let is_raw = numbers.is_none();
+    let Suspect { map, numbers, is_raw, crs, .. } = suspect;
     let doubtful = is_raw || !overlaps(&map, reference);
     let at_first = match start {
         Start::None => registrar.as_it_stands(&map.data),
@@ -46,10 +45,11 @@ pub fn register(
     if start == Start::None || plain.agrees() || !doubtful && plain.registration.agrees_in_part() {
         return Ok(plain);
     }
-    let raw = numbers.map(Numbers::raw).transpose()?;
-    let raw = raw.as_ref().unwrap_or(&plain.map);
-    let assumptions = likely_assumptions(raw, crs.as_ref(), reference);
-    let assumed = in_place(registrar, reference, raw, &assumptions);
+    let assumptions = match is_raw {
+        true => likely_assumptions(&plain.map, crs.as_ref(), reference),
+        false => likely_assumptions(&numbers.clone().raw()?, crs.as_ref(), reference),
+    };
+    let assumed = in_place(registrar, reference, &numbers, &assumptions);
     if start == Start::Auto && assumed.as_ref().is_some_and(Registered::agrees) {
         return Ok(assumed.expect("it agrees"));
     }
@@ -65,13 +65,13 @@ pub fn register(
 fn in_place(
     registrar: &Registrar,
     reference: &Survey,
-    raw: &Survey,
+    numbers: &Numbers,
     assumptions: &[Assumption],
 ) -> Option<Registered> {
     let target = reference.crs.as_ref()?;
     let mut best: Option<Registered> = None;
     for assumption in assumptions {
-        let Ok(map) = assumption.apply(raw, target) else { continue };
+        let Ok(map) = numbers.assumed(assumption, target) else { continue };
         let registration = registrar.refine_in_place(&map.data);
         let next = Registered::new(map, Some(assumption), registration);
         let agrees = next.agrees();

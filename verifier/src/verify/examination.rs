@@ -15,7 +15,7 @@ use crate::{
     progress::Progress,
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
-use meshmark_dataset::{CoordinateSystem, Survey};
+use meshmark_dataset::{CoordinateSystem, LeftOut, Survey};
 use meshmark_detection::{
     Matched, Observations, Reference,
     decision::{Decision, Expected, decide_among},
@@ -30,6 +30,8 @@ pub struct Examination {
     pub registration: Registration,
     /// Numbers of vertices of the two maps.
     pub vertices: VertexCounts,
+    /// What the suspect has that was left out.
+    pub left_out: LeftOut,
     /// Digest of the vertices of the reference.
     pub reference_digest: String,
     /// CRS of the reference.
@@ -151,7 +153,8 @@ pub fn examine(
         Err(error) => return Ok(unfit(error.into())),
     };
     let crs = reference.crs.as_ref();
-    Ok(Suited::Yes(Examination { suspect_crs, ..seen(request, (&matched, evidence), registration, crs) }))
+    let seen = seen(request, (&matched, evidence), registration, crs);
+    Ok(Suited::Yes(Examination { suspect_crs, left_out: suspect.left_out, ..seen }))
 }
 
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {
@@ -171,10 +174,10 @@ fn register(
     let registrar_of = |map| Registrar::new(map, &compared.ground, request.radius.least_m());
     let onto = |map, suspect: Suspect| {
         let registered = crs_search::register(&registrar_of(map), reference, suspect, request.registration);
-        registered.map_err(|error| maps::failed("suspect", &request.suspect, error))
+        registered.map_err(|error| maps::failed("suspect", request.suspect.original(), error))
     };
     let maps_of_features = maps_of_features(&reference.data, &compared.ground, &suspect.map.data)?;
-    if request.registration == Start::Auto && suspect.numbers.is_some() {
+    if request.registration == Start::Auto && !suspect.is_raw {
         let in_place = |map| registrar_of(map).refine_in_place(&suspect.map.data);
         if let Some(registration) = maps_of_features.iter().map(in_place).find(Registration::agrees) {
             return Ok(Registered { map: suspect.map, registration });
@@ -221,6 +224,7 @@ fn seen(
         reference_digest: reference.digest(),
         crs: crs.map(|crs| crs.brief_name()),
         suspect_crs: Vec::new(),
+        left_out: LeftOut::default(),
         radius,
         found,
         observations,

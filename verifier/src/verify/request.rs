@@ -1,5 +1,6 @@
 //! The request of a verification.
 
+use crate::inputs::private_copy::PrivateCopy;
 use meshmark_core::{
     key::SecretKey,
     options::{Parameters, Subject},
@@ -51,7 +52,7 @@ pub struct Request {
     /// The map before marking.
     pub reference: PathBuf,
     /// The suspect map.
-    pub suspect: PathBuf,
+    pub suspect: PrivateCopy,
     /// The record that the driver wrote when it marked the map.
     pub record: Option<Recorded>,
     /// The expected subject of the mark, if it is known.

@@ -1,0 +1,91 @@
+//! The private copy of a suspect. GDAL and SQLite write to what they read, also when they only read:
+//! a log is merged into its database and deleted, a lost index is made anew. They therefore never
+//! see the suspect itself, which stays as it was.
+
+use super::belonging_files::{BelongingFile, files_of};
+use crate::{Error, Result};
+use meshmark_dataset::workplace::Workplace;
+use std::{
+    env, fs, io,
+    path::{Component, Path, PathBuf},
+    sync::Arc,
+};
+
+/// Tiles are named by their folders: zoom, column, row.
+const NAMED_BY: usize = 3;
+
+/// A suspect and the copy of it that is examined.
+#[derive(Clone)]
+pub struct PrivateCopy {
+    original: PathBuf,
+    copy: PathBuf,
+    _workplace: Arc<Workplace>,
+}
+
+impl PrivateCopy {
+    /// Copies a file with all that belongs to it, or a folder, into the folder of temporary files.
+    ///
+    /// # Errors
+    /// Fails for what is neither a file nor a folder, and where it cannot be read or copied.
+    pub fn of(original: &Path) -> Result<Self> {
+        if !original.is_file() && !original.is_dir() {
+            return Err(Error::NoFile { path: original.into() });
+        }
+        let unread = |source: io::Error| Error::Undigested { path: original.into(), source };
+        let place = env::temp_dir();
+        let uncopied =
+            |source: io::Error| Error::Uncopied { path: original.into(), place: place.clone(), source };
+        let workplace = Workplace::new(&place)?;
+        let files = files_of(original).map_err(unread)?;
+        let copy = workplace
+            .subfolder("suspect")?
+            .join(last_names(&original.canonicalize().map_err(unread)?, original));
+        let folder = match original.is_dir() {
+            true => copy.as_path(),
+            false => copy.parent().expect("a file is in a folder"),
+        };
+        fs::create_dir_all(folder).map_err(uncopied)?;
+        for BelongingFile { name, path } in files {
+            let target = folder.join(name);
+            fs::create_dir_all(target.parent().expect("a file is in a folder")).map_err(uncopied)?;
+            let mut source = fs::File::open(&path).map_err(|source| Error::Undigested { path, source })?;
+            let mut target = fs::File::create(target).map_err(uncopied)?;
+            io::copy(&mut source, &mut target).map_err(uncopied)?;
+        }
+        Ok(PrivateCopy { original: original.into(), copy, _workplace: Arc::new(workplace) })
+    }
+
+    /// Returns the path of the suspect, for messages.
+    pub fn original(&self) -> &Path {
+        &self.original
+    }
+
+    /// Returns the path of the copy, for reading.
+    pub fn copy(&self) -> &Path {
+        &self.copy
+    }
+
+    /// Returns the path of the suspect's own file for one of the copy.
+    pub fn original_of(&self, copied: &Path) -> PathBuf {
+        match copied.strip_prefix(&self.copy) {
+            Ok(rest) if !rest.as_os_str().is_empty() => self.original.join(rest),
+            _ => self.original.clone(),
+        }
+    }
+}
+
+/// Returns the last names of a full path, of which the very last is that of the path as it was given.
+fn last_names(full: &Path, given: &Path) -> PathBuf {
+    let names: Vec<&std::ffi::OsStr> = full
+        .components()
+        .filter_map(|component| match component {
+            Component::Normal(name) => Some(name),
+            _ => None,
+        })
+        .collect();
+    let mut path: PathBuf = names[names.len().saturating_sub(NAMED_BY)..].iter().collect();
+    if let Some(name) = given.file_name() {
+        path.set_file_name(name);
+    }
+    path
+}

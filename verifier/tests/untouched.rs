@@ -1,0 +1,133 @@
+//! The files of a suspect are evidence: the examination leaves them as they were, whatever GDAL and
+//! SQLite write while they read.
+
+mod common;
+
+use common::{assert_answer, fixture, verify};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+use tempfile::TempDir;
+
+/// All files of a folder with their content.
+fn content(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => files.extend(content(&path)),
+            false => drop(files.insert(path.clone(), fs::read(&path).unwrap())),
+        }
+    }
+    files
+}
+
+/// Asserts a match that leaves the folder of the suspect as it was.
+fn assert_untouched(folder: &TempDir, suspect: &str) {
+    let before = content(folder.path());
+    assert_answer(&folder.path().join(suspect), 0, "MATCH");
+    assert!(content(folder.path()) == before, "{suspect}: the evidence was changed");
+}
+
+fn converted(folder: &TempDir, name: &str, more: &[&str]) {
+    let run = Command::new("ogr2ogr")
+        .args(more)
+        .arg(folder.path().join(name))
+        .arg(fixture("vectors/marked.gpkg"))
+        .arg("buildings")
+        .status();
+    assert!(run.unwrap().success());
+}
+
+/// A GeoPackage with the unmarked map in its main file, and the marked one in its log.
+fn with_log(folder: &TempDir) {
+    let made = folder.path().join("made.gpkg");
+    fs::copy(fixture("kotka.gpkg"), &made).unwrap();
+    let database = rusqlite::Connection::open(&made).unwrap();
+    let mut triggers = database.prepare("SELECT name FROM sqlite_master WHERE type = 'trigger'").unwrap();
+    let names: Vec<String> =
+        triggers.query_map((), |row| row.get(0)).unwrap().collect::<Result<_, _>>().unwrap();
+    drop(triggers);
+    for name in names {
+        database.execute_batch(&format!("DROP TRIGGER \"{name}\"")).unwrap();
+    }
+    database
+        .execute_batch(
+            "PRAGMA journal_mode = wal; PRAGMA wal_checkpoint(truncate); PRAGMA wal_autocheckpoint = 0",
+        )
+        .unwrap();
+    database.execute("ATTACH ? AS marked", [fixture("vectors/marked.gpkg").to_str().unwrap()]).unwrap();
+    for table in ["buildings", "landuse", "roads"] {
+        let marked = format!("SELECT geom FROM marked.{table} WHERE fid = {table}.fid");
+        database.execute_batch(&format!("UPDATE {table} SET geom = ({marked})")).unwrap();
+    }
+    for ending in ["", "-wal"] {
+        let copied = folder.path().join(format!("suspect.gpkg{ending}"));
+        fs::copy(folder.path().join(format!("made.gpkg{ending}")), copied).unwrap();
+    }
+    drop(database);
+    content(folder.path()).keys().filter(|path| !path.to_str().unwrap().contains("suspect")).for_each(
+        |path| {
+            fs::remove_file(path).unwrap();
+        },
+    );
+}
+
+#[test]
+fn a_log_beside_a_database_is_read_digested_and_left_as_it_was() {
+    let folder = TempDir::new().unwrap();
+    with_log(&folder);
+    assert_untouched(&folder, "suspect.gpkg");
+    fs::remove_file(folder.path().join("suspect.gpkg-wal")).unwrap();
+    assert_answer(&folder.path().join("suspect.gpkg"), 1, "NO MATCH");
+}
+
+#[test]
+fn a_link_to_a_database_with_a_log_is_read_with_that_log() {
+    let folder = TempDir::new().unwrap();
+    with_log(&folder);
+    let elsewhere = TempDir::new().unwrap();
+    let link = elsewhere.path().join("link.gpkg");
+    std::os::unix::fs::symlink(folder.path().join("suspect.gpkg"), &link).unwrap();
+    let before = content(folder.path());
+    assert_answer(&link, 0, "MATCH");
+    assert!(content(folder.path()) == before);
+}
+
+#[test]
+fn a_shapefile_without_its_index_is_read_and_gets_none() {
+    let folder = TempDir::new().unwrap();
+    converted(&folder, "suspect.shp", &[]);
+    fs::remove_file(folder.path().join("suspect.shx")).unwrap();
+    assert_untouched(&folder, "suspect.shp");
+}
+
+#[test]
+fn other_formats_and_folders_are_left_as_they_were() {
+    for (name, more) in [
+        ("suspect.gml", &["-f", "GML"][..]),
+        ("suspect.tab", &["-f", "MapInfo File"]),
+        ("suspect.csv", &["-f", "CSV", "-lco", "GEOMETRY=AS_WKT", "-lco", "CREATE_CSVT=YES"]),
+        ("suspect.sqlite", &["-f", "SQLite"]),
+        ("folder", &["-f", "ESRI Shapefile"]),
+        ("suspect.fgb", &["-f", "FlatGeobuf"]),
+    ] {
+        let folder = TempDir::new().unwrap();
+        converted(&folder, name, more);
+        assert_untouched(&folder, name);
+    }
+}
+
+#[test]
+fn a_broken_suspect_is_named_by_its_own_path() {
+    let folder = TempDir::new().unwrap();
+    for name in ["broken.gpkg", "broken.shp", "broken.geojson", "broken.svg"] {
+        let path = common::write(&folder, name, "{ SQLite format 3");
+        let (code, text) = verify(&path);
+        assert_eq!(code, Some(5), "{text}");
+        assert!(text.contains(path.to_str().unwrap()) && !text.contains(".meshmark-write-"), "{text}");
+    }
+}
