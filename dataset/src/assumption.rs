@@ -1,7 +1,7 @@
 //! Assumptions about maps whose CRS is missing or wrong: the CRS that their coordinates may be in,
 //! given the region of the earth where they should lie.
 
-use crate::{CoordinateSystem, Survey};
+use crate::{CoordinateSystem, Survey, crs::Assumption};
 use meshmark_core::vertices::VertexTable;
 
 /// EPSG codes of projected CRS and their areas of use: code, west, south, east, north in degrees.
@@ -17,15 +17,6 @@ const AREA_MARGIN_DEGREES: f64 = 0.5;
 const LEAST_SHARE: f64 = 0.1;
 /// This many points of a map determine its region.
 const SAMPLE: usize = 500;
-
-/// An interpretation of the coordinates of a map.
-#[derive(Debug, Clone)]
-pub struct Assumption {
-    /// Their CRS.
-    pub crs: CoordinateSystem,
-    /// Whether x and y are exchanged in the file.
-    pub axes_swapped: bool,
-}
 
 /// A part of the earth, in degrees on the datum of some CRS.
 struct Region {

@@ -24,6 +24,15 @@ const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
 #[derive(Debug, Clone)]
 pub struct CoordinateSystem(SpatialRef);
 
+/// An interpretation of the coordinates of a map.
+#[derive(Debug, Clone)]
+pub struct Assumption {
+    /// Their CRS.
+    pub crs: CoordinateSystem,
+    /// Whether x and y are exchanged in the file.
+    pub axes_swapped: bool,
+}
+
 impl CoordinateSystem {
     /// Wraps a CRS with the axes x = easting or longitude, y = northing or latitude.
     pub fn new(mut srs: SpatialRef) -> Self {

@@ -33,8 +33,8 @@ mod turns;
 pub mod wkb;
 pub mod workplace;
 
-pub use assumption::{Assumption, likely_assumptions, overlaps};
-pub use crs::{CoordinateSystem, parse_srs};
+pub use assumption::{likely_assumptions, overlaps};
+pub use crs::{Assumption, CoordinateSystem, parse_srs};
 pub use error::{Action, Error, Result, file_error};
 pub use features::{FeatureGeometry, features};
 pub use file_digest::{digest_of_only_file, file_digest};

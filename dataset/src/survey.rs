@@ -1,9 +1,9 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    Assumption, CoordinateSystem, Error, Geometries, Result,
+    CoordinateSystem, Error, Geometries, Result,
     chains::{Chains, read_geometry},
-    crs::{self, reproject},
+    crs::{self, Assumption, reproject},
     extent::Extent,
     labels,
     left_out::{Faults, LeftOut, MISSING, is_there},

@@ -60,7 +60,7 @@ pub fn suspect(suspect: &PrivateCopy, reference: &Survey) -> Result<Suspect> {
 
 fn open_suspect(suspect: &PrivateCopy) -> Result<Dataset> {
     let (path, copy) = (suspect.original(), suspect.copy());
-    forbid_network().map_err(|source| Error::NoOption { source })?;
+    configure(copy).map_err(|source| Error::NoOption { source })?;
     check_table(suspect)?;
     suspect_formats::check(path)?;
     if svg::is_named(copy) {
@@ -99,9 +99,24 @@ fn numbered(folder: &Path) -> Vec<(u32, PathBuf)> {
     entries.filter_map(|entry| Some((entry.file_name()?.to_str()?.parse().ok()?, entry))).collect()
 }
 
-/// Prevents network access. A suspect may name addresses, as the CRS of a GeoJSON file or as the
+/// Returns whether a shapefile of the copy lacks its index. GDAL can make it anew beside the copy,
+/// but would then do so for files in archives, too, to which it cannot write.
+fn lacks_index(copy: &Path) -> bool {
+    let has =
+        |path: &Path, extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    let lacks = |path: &Path| {
+        let indices = ["shx", "SHX"].map(|extension| path.with_extension(extension));
+        has(path, "shp") && !indices.iter().any(|index| index.is_file())
+    };
+    match copy.read_dir() {
+        Ok(entries) => entries.flatten().any(|entry| lacks(&entry.path())),
+        Err(_) => lacks(copy),
+    }
+}
+
+/// Prevents network access, and chooses what GDAL may do with the copy. A suspect may name addresses, as the CRS of a GeoJSON file or as the
 /// schema of a GML file; a request would reveal the examination, and its answer could falsify it.
-fn forbid_network() -> gdal::errors::Result<()> {
+fn configure(copy: &Path) -> gdal::errors::Result<()> {
     for (option, value) in [
         ("GDAL_HTTP_PROXY", "127.0.0.1:0"), // no process can listen on port 0
         ("GDAL_HTTPS_PROXY", "127.0.0.1:0"),
@@ -111,7 +126,7 @@ fn forbid_network() -> gdal::errors::Result<()> {
         ("ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW", "NO"),
         ("OGR_SQLITE_LOAD_EXTENSIONS", ""),
         ("SPATIALITE_SECURITY", "strict"),
-        ("SHAPE_RESTORE_SHX", "YES"), // beside the copy
+        ("SHAPE_RESTORE_SHX", if lacks_index(copy) { "YES" } else { "NO" }), // beside the copy
     ] {
         gdal::config::set_thread_local_config_option(option, value)?;
     }
