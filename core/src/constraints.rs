@@ -1,5 +1,5 @@
-//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid, bodies. All of
-//! them are linear in the displacements and follow from the reference alone, so that the verifier
+//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid or stiff, bodies.
+//! All of them are linear in the displacements and follow from the reference alone, so that the verifier
 //! repeats them.
 
 use crate::{
@@ -27,7 +27,7 @@ impl Constraints {
     pub(crate) fn find(map: &Map, tree: &VertexTree, shape: Rigidity) -> Self {
         let mut touches = touches(map, tree);
         let bodies = match shape {
-            Rigidity::Rigid if !map.polygon_roots.is_empty() => {
+            Rigidity::Rigid | Rigidity::Stiff if !map.polygon_roots.is_empty() => {
                 Bodies::find(map, touches.iter().map(|touch| (touch.vertex, touch.segment)))
             }
             _ => Bodies::default(),

@@ -271,7 +271,7 @@ impl Sample {
         found.at.truncate(SAMPLE_VERTICES);
         let basis = Basis::low_frequencies(patch, carriers + 1)?;
         let count = found.rows.len();
-        let seen = of.seen(number, &Response::carriers(patch, &basis, parameters.shape), &found.rows);
+        let seen = of.seen(number, &Response::carriers(patch, &basis, parameters), &found.rows);
         let moved = found.moved.subrows(0, count).to_owned();
         let mark = seen.covariance() * faer::Scale(parameters.amplitude_m.powi(2));
         Ok(Sample { at: found.at, moved, mark })

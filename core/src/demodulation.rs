@@ -272,7 +272,7 @@ fn joint_of(job: &Job, disturbance: &Prediction) -> Result<Demodulation> {
         let weights: Vec<f64> =
             found.rows.iter().map(|&row| disturbance.weights[points[row] as usize]).collect();
         let covariance = Covariance::new(&disturbance.deformation, &found.at, &weights);
-        let response = Response::carriers(&job.patches()[patch], basis, parameters.shape);
+        let response = Response::carriers(&job.patches()[patch], basis, parameters);
         let seen = job.of.seen(patch, &response, &found.rows);
         let seen = seen.map(|block| covariance.whiten(block));
         let kernel = seen.kernel();

@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn points_respond_as_the_function_of_their_vertices_does() {
         let (town, houses) = town();
-        for shape in [Rigidity::Free, Rigidity::Rigid] {
+        for shape in [Rigidity::Free, Rigidity::Rigid, Rigidity::Stiff] {
             let parameters = Parameters { shape, ..Parameters::default() };
             let patches = Patches::new(&on(&town), &parameters).unwrap();
             let row = |vertex: &u32| patches.rows()[*vertex as usize];
@@ -222,7 +222,7 @@ mod tests {
             let shares: Vec<(u32, [[f64; 2]; 2])> = vertices.iter().map(|vertex| (*vertex, skew)).collect();
             let points = DerivedPoints::new(&patches, [&shares[..]].into_iter());
             let basis = Basis::low_frequencies(&patches.as_slice()[0], 60).unwrap();
-            let response = Response::carriers(&patches.as_slice()[0], &basis, shape);
+            let response = Response::carriers(&patches.as_slice()[0], &basis, &parameters);
             let coefficients =
                 [0, 1].map(|axis| (0..59).map(|i| ((i * 7 + axis) % 5) as f64 - 2.0).collect());
             let all = response.synthesise(&coefficients);

@@ -11,7 +11,7 @@ use crate::{
     message::Message,
     modulation::SpreadMessage,
     nearness::VertexTree,
-    options::{Parameters, Rigidity},
+    options::{AmplitudeOf, Parameters, Rigidity},
     patches::{Patch, Patches},
     placement::Placement,
     response::Response,
@@ -223,25 +223,18 @@ impl<'a> Groundwork<'a> {
         marks: &[S],
     ) -> Result<Vec<Vec<[f64; 2]>>> {
         let basis = Basis::known_or_solved(&self.bases, number, patch, self.coefficients + 1)?;
-        let gain = match self.parameters.shape {
-            Rigidity::Free => 1.0,
-            Rigidity::Rigid => {
-                let carriers = basis.vectors.subcols(1, self.coefficients);
-                Response::new(patch, carriers.to_owned()).gain(patch, carriers.to_owned())
-            }
-        };
-        let in_units = |((&vertex, x), y): ((&u32, f64), f64)| {
+        let in_units = |(&vertex, [x, y]): (&u32, [f64; 2])| {
             let scale = self.map.ground.metres_per_unit(self.map.at(vertex));
             [x / scale[0], y / scale[1]]
         };
+        let synthesis = Synthesis::new(patch, &basis, self.parameters);
         let of_mark = |mark: &S| {
-            let [x, y] = [0, 1].map(|axis| {
+            let of_axis = |axis| -> Vec<f64> {
                 let signs = mark.signs(number, axis, self.coefficients).into_iter();
-                // Coefficient 0 is the mean.
-                let modulated = signs.map(|sign| gain * (self.parameters.amplitude_m * sign));
-                basis.synthesise(&std::iter::once(0.0).chain(modulated).collect::<Vec<_>>())
-            });
-            patch.vertices.iter().zip(x).zip(y).map(in_units).collect()
+                signs.map(|sign| self.parameters.amplitude_m * sign).collect()
+            };
+            let displacements_m = synthesis.displacements_m(&[0, 1].map(of_axis));
+            patch.vertices.iter().zip(displacements_m).map(in_units).collect()
         };
         Ok(marks.iter().map(of_mark).collect())
     }
@@ -281,5 +274,43 @@ impl<'a> Groundwork<'a> {
     /// Returns the patches from which a mark is read back first.
     pub fn first_patches(&self) -> Patches {
         self.patches.head(READ_BACK_PATCHES)
+    }
+}
+
+/// What makes displacements of coefficients.
+enum Synthesis<'a> {
+    /// The basis alone, from which [`settle`] makes those of bodies and hanging vertices: the last
+    /// bits of marks of messages depend on this order.
+    Basis { basis: &'a Basis, gain: f64 },
+    /// The response, with all constraints.
+    Response(Response),
+}
+
+impl<'a> Synthesis<'a> {
+    fn new(patch: &Patch, basis: &'a Basis, parameters: &Parameters) -> Self {
+        let carriers = || basis.vectors.subcols(1, basis.vectors.ncols() - 1).to_owned();
+        match (parameters.amplitude_of, parameters.shape) {
+            (AmplitudeOf::Coefficient, Rigidity::Free) => Synthesis::Basis { basis, gain: 1.0 },
+            (AmplitudeOf::Coefficient, Rigidity::Rigid) => {
+                let gain = Response::new(patch, carriers()).gain(patch, carriers());
+                Synthesis::Basis { basis, gain }
+            }
+            _ => Synthesis::Response(Response::carriers(patch, basis, parameters)),
+        }
+    }
+
+    /// Returns the displacements of all rows, metres, by the coefficients of either axis.
+    fn displacements_m(&self, coefficients: &[Vec<f64>; 2]) -> Vec<[f64; 2]> {
+        match self {
+            Synthesis::Response(response) => response.synthesise(coefficients),
+            Synthesis::Basis { basis, gain } => {
+                let [x, y] = coefficients.each_ref().map(|values| {
+                    let amplified = values.iter().map(|value| gain * value);
+                    // Coefficient 0 is the mean.
+                    basis.synthesise(&std::iter::once(0.0).chain(amplified).collect::<Vec<_>>())
+                });
+                x.into_iter().zip(y).map(|(x, y)| [x, y]).collect()
+            }
+        }
     }
 }

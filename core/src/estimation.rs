@@ -73,7 +73,7 @@ impl Estimates {
                 .map(|&row| disturbance.weights[of.in_patch(number)[row] as usize])
                 .collect();
             let covariance = Covariance::new(&disturbance.deformation, &found.at, &weights);
-            let response = Response::carriers(patch, &basis, parameters.shape);
+            let response = Response::carriers(patch, &basis, parameters);
             let seen = of.seen(number, &response, &found.rows);
             let seen = seen.map(|block| covariance.whiten(block));
             let correlations = seen.correlations(&covariance.whiten(found.moved));

@@ -8,7 +8,7 @@ use crate::{
     Error, Result,
     error::RecordFault,
     key::SecretKey,
-    options::{Laplacian, Options, PATCH_SIZE_RANGE, Parameters, Rigidity, Subject},
+    options::{AmplitudeOf, Laplacian, Options, PATCH_SIZE_RANGE, Parameters, Rigidity, Subject},
     part::PartDigest,
     record::Distortion,
 };
@@ -49,7 +49,7 @@ pub struct FingerprintRecord {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FingerprintShape {
-    /// α, amplitude per coefficient, metres on the ground.
+    /// Expected displacement of the vertices, root mean square, metres on the ground.
     pub amplitude_m: f64,
     /// Coefficients of a patch and axis that carry the mark.
     pub coefficients: usize,
@@ -121,8 +121,16 @@ impl FingerprintShape {
         let FingerprintShape {
             amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, ..
         } = *self;
-        let of_message = Parameters::default();
-        Parameters { amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, ..of_message }
+        Parameters {
+            amplitude_m,
+            amplitude_of: AmplitudeOf::Displacement,
+            patch_size,
+            tolerance_m,
+            shape,
+            basis,
+            precision_crs_units,
+            ..Parameters::default()
+        }
     }
 }
 
@@ -206,7 +214,7 @@ mod tests {
             software: "meshmark 0.1.0".into(),
             key_commitment: SecretKey::from_bytes([7; 32]).commitment(),
             recipient: "ACME GmbH".into(),
-            mark: FingerprintShape::new(256, &Parameters::default()),
+            mark: FingerprintShape::new(256, &Parameters::of_fingerprint()),
             layers: None,
             srs: None,
             reference: ReferenceEntry {
@@ -241,7 +249,7 @@ mod tests {
         let read = FingerprintRecord::from_json(&record().to_json()).unwrap();
         assert_eq!(read, record());
         assert!(read.is_of(&SecretKey::from_bytes([7; 32])) && !read.is_of(&SecretKey::from_bytes([8; 32])));
-        assert_eq!(read.mark.parameters(), Parameters::default());
+        assert_eq!(read.mark.parameters(), Parameters::of_fingerprint());
     }
 
     #[test]

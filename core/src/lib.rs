@@ -77,6 +77,7 @@ pub mod scale;
 mod sides;
 pub mod signs;
 pub mod spectrum;
+pub mod stiffness;
 mod topology;
 mod tridiagonal;
 pub mod vertices;

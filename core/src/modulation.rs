@@ -49,7 +49,7 @@ pub fn displacements_m<S: Signs>(
 ) -> Result<Vec<Vec<[f64; 2]>>> {
     let of_patch = |(number, patch): (usize, &Patch)| -> Result<Vec<Vec<[f64; 2]>>> {
         let basis = Basis::low_frequencies(patch, coefficients + 1)?;
-        let response = Response::carriers(patch, &basis, parameters.shape);
+        let response = Response::carriers(patch, &basis, parameters);
         let of_mark = |mark: &S| {
             response.synthesise(&[0, 1].map(|axis| {
                 let signs = mark.signs(number, axis, coefficients);
@@ -96,7 +96,7 @@ mod tests {
         let map = town.on(Ground::Plane { metres_per_unit: 1.0 }, None);
         let (key, message) = (SecretKey::from_bytes([4; 32]), Message::from_bytes(&[0x5a; 16]));
         // A body turns by an angle, which the response takes as its sine.
-        for (shape, most_m) in [(Rigidity::Free, 1e-9), (Rigidity::Rigid, 5e-3)] {
+        for (shape, most_m) in [(Rigidity::Free, 1e-9), (Rigidity::Rigid, 5e-3), (Rigidity::Stiff, 5e-3)] {
             let parameters = Parameters { shape, ..Parameters::default() };
             let patches = Patches::new(&map, &parameters).unwrap();
             let carrier = Carrier::new(&key);

@@ -8,7 +8,8 @@ use crate::{
     map::Map,
     mesh::Mesh,
     nearness::{VertexTree, cross, dot},
-    options::{Laplacian, Parameters},
+    options::{Laplacian, Parameters, Rigidity},
+    stiffness::{Strains, strains},
 };
 use faer::Mat;
 use rayon::prelude::*;
@@ -27,6 +28,8 @@ pub struct Patch {
     pub hanging: Vec<HangingRow>,
     /// The bodies among the vertices.
     pub bodies: Vec<BodyRows>,
+    /// The strains of what is neither body nor point, with [`Rigidity::Stiff`].
+    pub strains: Strains,
 }
 
 /// A body of a patch.
@@ -108,6 +111,10 @@ impl Patches {
         let mut patches = with_edges(leaves, mesh.edges(), &place);
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
         constrain(&mut patches, &constraints, &place);
+        if parameters.shape == Rigidity::Stiff {
+            let strains = strains(map, &constraints, &place, patches.len());
+            patches.iter_mut().zip(strains).for_each(|(patch, strains)| patch.strains = strains);
+        }
         if parameters.basis == Laplacian::Cotangent {
             weigh(&mut patches, mesh.triangles(), &place, &points);
         }

@@ -1,6 +1,11 @@
 //! The response of the vertices of a patch to its coefficients, constraints included.
 
-use crate::{options::Rigidity, patches::Patch, spectrum::Basis};
+use crate::{
+    options::{AmplitudeOf, Parameters, Rigidity},
+    patches::Patch,
+    spectrum::Basis,
+    stiffness::stiffen,
+};
 use faer::{
     Accum, Mat, Par, Scale,
     linalg::matmul::triangular::{self, BlockStructure},
@@ -38,35 +43,50 @@ impl Kernel {
 }
 
 impl Response {
-    /// Returns the response to the coefficients that carry the mark, all but the mean. With
-    /// SHAPE=rigid it is amplified, so that the expected displacement, root mean square, is that of
-    /// free vertices.
-    pub fn carriers(patch: &Patch, basis: &Basis, shape: Rigidity) -> Self {
-        let carriers = basis.vectors.ncols() - 1;
-        let basis = basis.vectors.subcols(1, carriers);
-        let mut response = Self::new(patch, basis.to_owned());
-        if shape == Rigidity::Rigid {
-            let gain = response.gain(patch, basis.to_owned());
-            response.blocks_mut().iter_mut().for_each(|block| *block *= Scale(gain));
-        }
+    /// Returns the response to the coefficients that carry the mark, all but the mean. It is
+    /// amplified, so that the expected displacement, root mean square, is that of free vertices
+    /// whatever the shape, or the amplitude itself where this is what it measures.
+    pub fn carriers(patch: &Patch, basis: &Basis, parameters: &Parameters) -> Self {
+        let carriers = basis.vectors.subcols(1, basis.vectors.ncols() - 1);
+        let mut response = Self::new(patch, carriers.to_owned());
+        let gain = match (parameters.amplitude_of, parameters.shape) {
+            (AmplitudeOf::Displacement, _) => root(patch.vertices.len() as f64 / response.energy()),
+            (AmplitudeOf::Coefficient, Rigidity::Free) => return response,
+            (AmplitudeOf::Coefficient, _) => response.gain(patch, carriers.to_owned()),
+        };
+        response.blocks_mut().iter_mut().for_each(|block| *block *= Scale(gain));
         response
     }
 
     /// Returns the ratio of the root mean square displacements by the basis functions with
-    /// T-junctions alone and with bodies.
+    /// T-junctions alone and with bodies and stiffness.
     pub fn gain(&self, patch: &Patch, mut basis: Mat<f64>) -> f64 {
-        let Response::Coupled(blocks) = self else { return 1.0 };
+        let Response::Coupled(_) = self else { return 1.0 };
         patch.follow(&mut basis);
-        let energy: f64 = blocks.as_flattened().iter().map(|block| block.squared_norm_l2()).sum();
-        if energy > 0.0 { (2.0 * basis.squared_norm_l2() / energy).sqrt() } else { 1.0 }
+        root(2.0 * basis.squared_norm_l2() / self.energy())
     }
 
-    /// Returns the response to basis functions (columns, n × k): free vertices follow them, bodies
-    /// follow by the nearest rigid motion, and hanging vertices follow their anchors.
+    /// Returns the expected Σ |Δ|² over all vertices, for random coefficients of ±1.
+    fn energy(&self) -> f64 {
+        match self {
+            Response::Separate(block) => 2.0 * block.squared_norm_l2(),
+            Response::Coupled(blocks) => {
+                blocks.as_flattened().iter().map(|block| block.squared_norm_l2()).sum()
+            }
+        }
+    }
+
+    /// Returns the response to basis functions (columns, n × k): free vertices follow them, stiff
+    /// ones with little change of angles and lengths; bodies follow by the nearest rigid motion, and hanging
+    /// vertices follow their anchors.
     pub fn new(patch: &Patch, basis: Mat<f64>) -> Self {
-        let mut response = match patch.bodies.is_empty() {
+        let mut response = match patch.bodies.is_empty() && patch.strains.is_empty() {
             true => Response::Separate(basis),
-            false => Response::Coupled(coupled(patch, basis)),
+            false => {
+                let mut blocks = coupled(patch, basis);
+                stiffen(patch, &mut blocks);
+                Response::Coupled(blocks)
+            }
         };
         response.blocks_mut().iter_mut().for_each(|block| patch.follow(block));
         response
@@ -178,6 +198,11 @@ impl Response {
             Response::Coupled(blocks) => blocks[axis].iter().enumerate().collect(),
         }
     }
+}
+
+/// Returns the square root of a ratio of energies; 1 where nothing moves.
+fn root(ratio: f64) -> f64 {
+    if ratio.is_finite() { ratio.sqrt() } else { 1.0 }
 }
 
 /// Returns the lower triangle of XᵀX, zeros above it.

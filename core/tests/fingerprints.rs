@@ -54,11 +54,11 @@ fn agreement(town: &MapData, seen: &Estimates, recipient: &str) -> Agreement {
 }
 
 #[test]
-fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_free_or_rigid() {
+fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_in_every_shape() {
     let town = town();
     let map = town.on(METRES, None);
-    for shape in [Rigidity::Free, Rigidity::Rigid] {
-        let parameters = Parameters { shape, ..Parameters::default() };
+    for shape in [Rigidity::Free, Rigidity::Rigid, Rigidity::Stiff] {
+        let parameters = Parameters { shape, ..Parameters::of_fingerprint() };
         let copy = embed(&map, &key(), "ACME", COEFFICIENTS, &parameters).unwrap();
         let mut observed = displaced(&town, &copy.coords);
         let whole = estimates(&map, &observed, &parameters);
@@ -87,7 +87,7 @@ fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_free_or_rigid() {
 #[test]
 fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
     let town = town();
-    let (map, key, parameters) = (town.on(METRES, None), key(), Parameters::default());
+    let (map, key, parameters) = (town.on(METRES, None), key(), Parameters::of_fingerprint());
     let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
     let embedding = embedding.for_many().unwrap();
     let names = ["ACME", "Öster AB"];
@@ -102,10 +102,10 @@ fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
 #[test]
 fn the_displacement_is_that_of_a_message() {
     let town = town();
-    let (map, parameters) = (town.on(METRES, None), Parameters::default());
+    let (map, parameters) = (town.on(METRES, None), Parameters::of_fingerprint());
     let of_recipient = embed(&map, &key(), "ACME", COEFFICIENTS, &parameters).unwrap().displacement;
     let message = Message::from_bytes(&[0x5a; 16]);
-    let of_message = embedding::embed(&map, &key(), &message, &parameters).unwrap().displacement;
+    let of_message = embedding::embed(&map, &key(), &message, &Parameters::default()).unwrap().displacement;
     assert!((of_recipient.rms_m / of_message.rms_m - 1.0).abs() < 0.05);
 }
 
@@ -113,11 +113,12 @@ fn the_displacement_is_that_of_a_message() {
 fn a_map_without_room_and_a_mark_without_effect_are_refused() {
     let town = town();
     let map = town.on(METRES, None);
-    let small = Parameters { patch_size: 250, ..Parameters::default() };
+    let small = Parameters { patch_size: 250, ..Parameters::of_fingerprint() };
     let refused = embed(&map, &key(), "ACME", COEFFICIENTS, &small).unwrap_err();
     assert!(matches!(refused, Error::TooManySigns { coefficients: COEFFICIENTS, vertices: 250, .. }));
     assert!(refused.to_string().ends_with("use a larger PATCH_SIZE"), "{refused}");
-    let coarse = Parameters { precision_crs_units: Some(0.7), amplitude_m: 0.01, ..Parameters::default() };
+    let coarse =
+        Parameters { precision_crs_units: Some(0.7), amplitude_m: 0.01, ..Parameters::of_fingerprint() };
     let lost = embed(&map, &key(), "ACME", COEFFICIENTS, &coarse).unwrap_err();
     assert!(matches!(lost, Error::FingerprintLost { .. }), "{lost}");
     assert!(check_score(7.9).is_err() && check_score(8.1).is_ok());
@@ -145,7 +146,9 @@ fn of_axis(all: &[f64], patch: usize, axis: usize, count: usize) -> Vec<f64> {
 #[test]
 fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
     let town = town();
-    let (map, parameters) = (town.on(METRES, None), Parameters::default());
+    // A free map shows every sign.
+    let parameters = Parameters { shape: Rigidity::Free, ..Parameters::of_fingerprint() };
+    let map = town.on(METRES, None);
     let patches = Patches::new(&map, &parameters).unwrap();
     // Messages: the copy of A and its message give the chips, and the chips any other message.
     let [a, b] = ["A", "B"].map(|name| key().recipient_message(name));

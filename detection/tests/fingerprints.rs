@@ -44,7 +44,7 @@ static TOWN: LazyLock<Town> = LazyLock::new(|| {
     let corners = (0..HOUSES).flat_map(|i| HOUSE.map(|[x, y]| [x + house(i)[0], y + house(i)[1]]));
     let corners: Vec<[f64; 2]> = corners.collect();
     let (data, indices) = rings(corners.clone());
-    let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::default());
+    let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::of_fingerprint());
     let map = data.on(METRES, None);
     let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
     let marks: Vec<_> = (0..COPIES).map(|k| embedding.fingerprint(&name(k))).collect();
@@ -83,7 +83,7 @@ fn random(i: usize) -> f64 {
 /// Lets `f` see the suspect as matched with its reference.
 fn with_suspect<T>(corners: Vec<[f64; 2]>, f: impl FnOnce(&Matched) -> T) -> T {
     let town = &TOWN;
-    let (map, parameters) = (town.data.on(METRES, None), Parameters::default());
+    let (map, parameters) = (town.data.on(METRES, None), Parameters::of_fingerprint());
     let reference = Reference::for_fingerprints(&town.data, &map, COEFFICIENTS, &parameters).unwrap();
     let (suspect, _) = rings(corners);
     let registration = Registrar::new(&town.data, &METRES, 1.0).register(&suspect, Start::None);
@@ -91,11 +91,11 @@ fn with_suspect<T>(corners: Vec<[f64; 2]>, f: impl FnOnce(&Matched) -> T) -> T {
 }
 
 fn estimated(corners: Vec<[f64; 2]>) -> Estimated {
-    with_suspect(corners, |matched| matched.estimate(&Parameters::default(), &|_| ()).unwrap())
+    with_suspect(corners, |matched| matched.estimate(&Parameters::of_fingerprint(), &|_| ()).unwrap())
 }
 
 fn standings(corners: Vec<[f64; 2]>) -> Vec<Standing> {
-    let parameters = Parameters::default();
+    let parameters = Parameters::of_fingerprint();
     let marks: Vec<_> = (0..CANDIDATES).map(|k| Fingerprint::new(&TOWN.key, &TOWN.part, &name(k))).collect();
     with_suspect(corners, |matched| {
         let seen = matched.estimate(&parameters, &|_| ()).unwrap();
@@ -241,7 +241,7 @@ fn the_key_shows_in_an_average_and_no_other_key_does() {
 
 #[test]
 fn the_power_is_that_of_a_trial_mark_unless_the_key_shows_or_nothing_moved() {
-    let (town, parameters) = (&TOWN, Parameters::default());
+    let (town, parameters) = (&TOWN, Parameters::of_fingerprint());
     let pilots = pilots(&town.key, &town.part);
     let power = |corners: Vec<[f64; 2]>| {
         with_suspect(corners, |matched| {

@@ -234,7 +234,7 @@ fn landmarks_are_fields_of_the_reference_and_match_any_field_of_the_suspect_by_v
 
 #[test]
 fn the_paper_counts_only_the_vertices_within_the_radius() {
-    let host = marked("helsinki.gpkg", &[]);
+    let host = marked("helsinki.gpkg", &["-oo", "CODE=LDPC"]);
     let map = Map::read(&host.path("marked.gpkg")).unwrap();
     let bent = deformation::deform(&map, deformation::Cell::Share(4), 1.0, deformation::Side::Cell).unwrap();
     bent.write(&host.path("bent.gpkg")).unwrap();

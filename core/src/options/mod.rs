@@ -12,7 +12,7 @@ mod values;
 pub use creation::Creation;
 pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
-pub use parameters::{Code, Laplacian, Parameters, Rigidity};
+pub use parameters::{AmplitudeOf, Code, Laplacian, Parameters, Rigidity};
 pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
 pub use subject::Subject;
 pub use table::{
@@ -58,6 +58,10 @@ impl Options {
         };
         let of_message = ["CODE", "CHIP_RATE"].iter().any(|name| values.given(name).is_some());
         let is_fingerprint = matches!(subject, Some(Subject::Recipient(_))) && !of_message;
+        let (amplitude_of, shape) = match is_fingerprint {
+            true => (AmplitudeOf::Displacement, Rigidity::Stiff),
+            false => (AmplitudeOf::Coefficient, Rigidity::Free),
+        };
         let code = values.choice("CODE", Code::from_name)?.unwrap_or(Code::default_for(bits));
         code.channel_bits(bits)?;
         Ok(Options {
@@ -65,11 +69,12 @@ impl Options {
             subject,
             parameters: Parameters {
                 amplitude_m: values.number("AMPLITUDE")?.expect("has a default"),
+                amplitude_of,
                 code,
                 chip_rate: values.integer("CHIP_RATE")?.unwrap_or(code.default_chip_rate()),
                 patch_size: values.integer("PATCH_SIZE")?.expect("has a default"),
                 tolerance_m: values.number("TOLERANCE")?.expect("has a default"),
-                shape: values.choice("SHAPE", Rigidity::from_name)?.expect("has a default"),
+                shape: values.choice("SHAPE", Rigidity::from_name)?.unwrap_or(shape),
                 basis: values.choice("BASIS", Laplacian::from_name)?.expect("has a default"),
                 precision_crs_units: values.number("PRECISION")?,
             },
@@ -126,6 +131,13 @@ impl Options {
     }
 }
 
+impl Parameters {
+    /// Returns the parameters of a fingerprint.
+    pub fn of_fingerprint() -> Self {
+        Options::parse_for_recipients([]).expect("the defaults are legal").parameters
+    }
+}
+
 impl Default for Parameters {
     /// Returns the parameters of a message as long as a recipient's.
     fn default() -> Self {
@@ -148,6 +160,13 @@ mod tests {
         assert_eq!((p.amplitude_m, p.patch_size), (0.10, 480));
         assert_eq!((p.tolerance_m, p.precision_crs_units), (0.75, None));
         assert_eq!((p.shape, p.basis), (Rigidity::Free, Laplacian::Biggs));
+        let of_fingerprint = Parameters::of_fingerprint();
+        let differences = (of_fingerprint.shape, of_fingerprint.amplitude_of);
+        assert_eq!(differences, (Rigidity::Stiff, AmplitudeOf::Displacement));
+        assert!(
+            spec("SHAPE").unwrap().help.ends_with("by default STIFF for a fingerprint, FREE for a message")
+        );
+        assert_eq!(Parameters { shape: p.shape, amplitude_of: p.amplitude_of, ..of_fingerprint }, p);
     }
 
     #[test]
@@ -160,8 +179,8 @@ mod tests {
         assert!(spec("CHIP_RATE").unwrap().help.ends_with("by default 1 with LDPC, 2 with REPETITION"));
         let of_128_bits = ("MESSAGE", "00112233445566778899aabbccddeeff");
         for subject in [&[][..], &[("RECIPIENT", "ACME")], &[of_128_bits]] {
-            assert_eq!(parsed(subject), (Code::Ldpc, 1));
             let and = |more: &[_]| parsed(&[subject, more].concat());
+            assert_eq!(and(&[]), (Code::Ldpc, 1));
             assert_eq!(and(&[("CODE", "repetition")]), (Code::Repetition, 2));
             assert_eq!(and(&[("CHIP_RATE", "3")]), (Code::Ldpc, 3));
             assert_eq!(and(&[("CODE", "REPETITION"), ("CHIP_RATE", "1")]), (Code::Repetition, 1));
@@ -170,7 +189,8 @@ mod tests {
             assert_eq!(parsed(&[("MESSAGE", hex)]), (Code::Repetition, 2), "{hex}");
             assert_eq!(parsed(&[("MESSAGE", hex), ("CHIP_RATE", "3")]), (Code::Repetition, 3));
         }
-        assert_eq!(Parameters::default(), Options::parse([("RECIPIENT", "ACME")]).unwrap().parameters);
+        let of_message = Options::parse([("RECIPIENT", "ACME"), ("CODE", "LDPC")]).unwrap();
+        assert_eq!(Parameters::default(), of_message.parameters);
     }
 
     #[test]
@@ -226,7 +246,7 @@ mod tests {
         assert!(error(&[("CHIP_RATE", "2.5")]).contains("whole number from 1"));
         assert!(error(&[("PATCH_SIZE", "3")]).contains("from 16 to 4096"));
         assert!(error(&[("CODE", "morse")]).contains("CODE=morse is not REPETITION or LDPC"));
-        assert!(error(&[("SHAPE", "round")]).contains("SHAPE=round is not FREE or RIGID"));
+        assert!(error(&[("SHAPE", "round")]).contains("SHAPE=round is not FREE or RIGID or STIFF"));
         assert!(error(&[("BASIS", "sines")]).contains("BASIS=sines is not BIGGS or COTANGENT"));
         let short = error(&[("CODE", "LDPC"), ("MESSAGE", "0123456789abcdef")]);
         assert!(short.contains("exactly 128 bits, not 64: use 32 hexadecimal digits"), "{short}");

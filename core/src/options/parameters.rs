@@ -6,8 +6,12 @@ use serde::{Deserialize, Serialize};
 /// Records and reports hold them as they are here.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameters {
-    /// α, amplitude per coefficient, metres on the ground.
+    /// The amplitude, metres on the ground.
     pub amplitude_m: f64,
+    /// What the amplitude measures. The version of the mark determines it, so that records do not
+    /// repeat it.
+    #[serde(skip)]
+    pub amplitude_of: AmplitudeOf,
     /// How the message becomes the channel bits.
     pub code: Code,
     /// c, coefficients per channel bit, patch and axis.
@@ -22,6 +26,16 @@ pub struct Parameters {
     pub basis: Laplacian,
     /// Grid of the marked coordinates, CRS units; `None` where it is not rounded.
     pub precision_crs_units: Option<f64>,
+}
+
+/// What an amplitude measures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AmplitudeOf {
+    /// α, the amplitude of every coefficient (marks of messages, as in the paper).
+    #[default]
+    Coefficient,
+    /// The expected displacement of the vertices, root mean square (fingerprints).
+    Displacement,
 }
 
 /// How many bits of a message LDPC carries.
@@ -83,14 +97,18 @@ pub enum Rigidity {
     /// Those of a building: a group of polygons that share vertices or walls, see
     /// [`crate::bodies`].
     Rigid,
+    /// Those of a building, and all others so that angles and lengths change little, see
+    /// [`crate::stiffness`].
+    Stiff,
 }
 
 impl Rigidity {
     /// The values of SHAPE.
-    pub const NAMES: [&str; 2] = ["FREE", "RIGID"];
+    pub const NAMES: [&str; 3] = ["FREE", "RIGID", "STIFF"];
 
     pub(super) fn from_name(name: &str) -> Option<Self> {
-        [Rigidity::Free, Rigidity::Rigid].into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
+        let shapes = [Rigidity::Free, Rigidity::Rigid, Rigidity::Stiff];
+        shapes.into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name))
     }
 
     /// Returns the option's value.

@@ -115,7 +115,7 @@ pub const OPTIONS: &[OptionSpec] = &[
         Kind::Number(0.0, 1e6),
         Some("0.10"),
         true,
-        "Amplitude of every coefficient, metres on the ground",
+        "Displacement of the vertices by a fingerprint, root mean square, or amplitude of every coefficient of a message; metres on the ground",
     ),
     row(
         "CODE",
@@ -163,9 +163,10 @@ pub const OPTIONS: &[OptionSpec] = &[
     row(
         "SHAPE",
         Kind::Choice(&Rigidity::NAMES),
-        Some("FREE"),
+        None,
         true,
-        "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them",
+        "FREE moves every vertex by itself; RIGID shifts and turns buildings as a whole, without bending them; STIFF \
+         does so too and keeps angles and lengths elsewhere; by default STIFF for a fingerprint, FREE for a message",
     ),
     row(
         "BASIS",
