@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 /// The version of this record.
 pub const VERSION: u32 = 2;
 
-/// A record of a fingerprint. It holds neither the secret nor the time, so that equal input makes an
-/// equal record.
+/// A record of a fingerprint. It holds neither the secret nor the time: equal input makes an equal
+/// record, but for the digests of files, which may hold the time at which they were written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FingerprintRecord {
     /// Version of this format.

@@ -8,6 +8,7 @@ mod assumption;
 mod chains;
 mod crs;
 mod crs_wkt;
+mod damage;
 pub mod decimals;
 mod error;
 mod extent;
@@ -35,6 +36,7 @@ pub mod workplace;
 
 pub use assumption::{likely_assumptions, overlaps};
 pub use crs::{Assumption, CoordinateSystem, parse_srs};
+pub use damage::damage_warning;
 pub use error::{Action, Error, Result, file_error};
 pub use features::{FeatureGeometry, features};
 pub use file_digest::{digest_of_only_file, file_digest};

@@ -129,10 +129,11 @@ pub fn warnings(
             ADVISED_BITS / 4
         ));
     }
-    let of_message = |message| parameters.code.encode(message).len() * parameters.chip_rate;
-    let of_patch = options.coefficients.or(message.map(of_message)).unwrap_or_default();
-    let coefficients = 2 * patches * of_patch; // on two axes
-    let wanted_rms_m = parameters.amplitude_m * (coefficients as f64 / map.data.vertices.len() as f64).sqrt();
+    let of_message = |message| {
+        let coefficients = 2 * patches * parameters.code.encode(message).len() * parameters.chip_rate;
+        parameters.amplitude_m * (coefficients as f64 / map.data.vertices.len() as f64).sqrt()
+    };
+    let wanted_rms_m = message.map_or(parameters.amplitude_m, of_message);
     if wanted_rms_m > parameters.tolerance_m {
         warnings.push(format!(
             "{} would move the vertices by {wanted_rms_m:.2} m RMS, more than {} m, where many of them are held: the map \

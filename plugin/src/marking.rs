@@ -22,7 +22,7 @@ use meshmark_core::{
     recorded::Recorded,
 };
 use meshmark_dataset::{
-    LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool,
+    LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool, damage_warning,
     decimals::Digits,
     marking::{self, Moves, Unmarked},
     same_file, survey,
@@ -158,17 +158,21 @@ impl Marking {
         marking::check_scale(&on_ground, map.crs.as_ref())?;
         let pool = pool(threads)?;
         let marked = pool.install(|| request.embed(&on_ground))?;
-        let record = map.geometries.as_ref().map(|geometries| {
-            let parameters = &options.parameters;
-            let distortion =
-                pool.install(|| Unmarked::new(geometries, &on_ground).distortion(&marked, parameters));
+        let parameters = &options.parameters;
+        let distortion = map.geometries.as_ref().map(|geometries| {
+            pool.install(|| Unmarked::new(geometries, &on_ground).distortion(&marked, parameters))
+        });
+        let areas = distortion.as_ref().map(|distortion| &distortion.areas);
+        let spelling = Spelling::OpenOption;
+        let damage = damage_warning(parameters, &marked.angles, areas, spelling);
+        let record = distortion.map(|distortion| {
             let reference = marking::reference(&map, marked.patches);
             marking::recorded(options, &request.subject, &request.key, reference, distortion)
         });
         map.geometries = None;
-        let spelling = Spelling::OpenOption;
         let message = options.coefficients.is_none().then(|| request.subject.carried(&request.key));
-        let warnings = marking::warnings(options, message.as_ref(), &map, marked.patches, spelling);
+        let mut warnings = marking::warnings(options, message.as_ref(), &map, marked.patches, spelling);
+        warnings.extend(damage);
         Ok(Marking {
             name: source.name,
             map,

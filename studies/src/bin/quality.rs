@@ -67,14 +67,14 @@ fn run(Arguments { maps, mut option, precision, shapes }: Arguments) -> Result<b
 }
 
 const HEADER: &str = "\
-| map | shape | basis | vertices | T-junctions | attenuated | invalid, new | overlaps, new, new slivers | crossings, new and lost | angle change, mean and p99 (°) | right angles kept | RMS (m) |
-|---|---|---|---|---|---|---|---|---|---|---|---|";
+| map | shape | basis | vertices | T-junctions | attenuated | invalid, new | overlaps, new, new slivers | crossings, new and lost | angle change, mean and p99 (°) | right angles kept | area change, mean and p99 (%) | RMS (m) |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|";
 
 fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
     let n = |pointer: &str| marked.number(pointer);
     let record = |pointer: &str| marked.record.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
     format!(
-        "| {} | {} | {} | {} | {} | {} | {}, {} | {}, {}, {} | {}, {} | {:.2}, {:.1} | {:.1} % | {:.3} |",
+        "| {} | {} | {} | {} | {} | {} | {}, {} | {}, {}, {} | {}, {} | {:.2}, {:.1} | {:.1} % | {:.3}, {:.2} | {:.3} |",
         map.file_stem().unwrap_or_default().to_string_lossy(),
         shape.to_lowercase(),
         basis.to_lowercase(),
@@ -91,6 +91,8 @@ fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
         n("/angles/mean_change_deg"),
         n("/angles/p99_change_deg"),
         100.0 * n("/angles/right_angles_kept"),
+        100.0 * n("/areas/mean_change"),
+        100.0 * n("/areas/p99_change"),
         n("/displacement/rms_m"),
     )
 }

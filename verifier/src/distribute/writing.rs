@@ -8,13 +8,13 @@ use crate::{
 use gdal::vector::LayerAccess;
 use meshmark_core::{
     key::SecretKey,
-    options::Options,
+    options::{Options, Spelling},
     record::{Distortion, Reference},
     recorded::Recorded,
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Action, Error as MapError, digest_of_only_file, file_error,
+    Action, Error as MapError, damage_warning, digest_of_only_file, file_error,
     formats::Format,
     marking::{self, Moves, Unmarked},
     publication::{Move, Publication},
@@ -53,6 +53,9 @@ pub fn write(job: &Job, copy: &MarkedCopy, moved: &[[f64; 2]], distortion: Disto
         }
     }
     check(job, &file, moves)?;
+    let (parameters, areas) = (&job.options.parameters, Some(&distortion.areas));
+    let damage = damage_warning(parameters, &distortion.angles, areas, Spelling::Flag);
+    job.warnings.lock().expect("nobody panics with them").extend(damage);
     let reference = job.reference.clone();
     let record = marking::recorded(job.options, &copy.subject(), job.key, reference, distortion);
     let record = with_digests(record, job, &folder)?;
