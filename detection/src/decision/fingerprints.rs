@@ -12,18 +12,15 @@ use meshmark_core::agreement::Evidence;
 /// The subject of a verdict; a change to any of these makes another mark.
 const COPY: &str = "a copy of this recipient, made with this key, options and reference,";
 
-/// What a verdict on fingerprints rests on besides the standing of a recipient.
-pub struct Grounds<'a> {
-    /// The evidence about recipients.
-    pub evidence: &'a Evidence,
-    /// The amplitude of the key's pilots, 1 for a mark of full amplitude.
-    pub pilot_amplitude: f64,
-    /// What a present mark would show.
-    pub power: Power,
-    /// Number of recipients that were tried.
-    pub tried: usize,
-    /// The significance for all of them.
-    pub significance: f64,
+/// What a verdict on fingerprints rests on besides the standing of a recipient. All recipients
+/// share it.
+pub struct Grounds {
+    significance: f64,
+    /// Whether a mark of the key shows and is weaker than that of one copy.
+    is_mixed: bool,
+    /// log₁₀ of the probability that the copy of one recipient has a score below the one needed, or
+    /// the least that is stated.
+    missed_log10: f64,
 }
 
 /// The answer about a recipient, and its grounds.
@@ -38,7 +35,29 @@ pub struct Answer {
     pub p_missed_log10: Option<f64>,
 }
 
-impl Grounds<'_> {
+impl Grounds {
+    /// Collects what a present mark would show. `pilot_amplitude` is that of the key's pilots, 1
+    /// for a mark of full amplitude; `tried` recipients share the `significance`.
+    pub fn new(
+        evidence: &Evidence,
+        pilot_amplitude: f64,
+        power: Power,
+        (tried, significance): (usize, f64),
+    ) -> Self {
+        let is_mixed = power == Power::KeyShows && evidence.fullness(pilot_amplitude) < LEAST_FULLNESS;
+        let expected = match power {
+            Power::Unmoved => f64::INFINITY,
+            Power::KeyShows => evidence.expected_score(pilot_amplitude),
+            Power::Trial(score) => score,
+        };
+        let lack = (expected - needed_score(tried, significance)) / TRIAL_DEVIATION;
+        let missed_log10 = match lack.is_finite() {
+            true => survival::normal_log10(lack).max(LEAST_MISSED_LOG10),
+            false => LEAST_MISSED_LOG10,
+        };
+        Grounds { significance, is_mixed, missed_log10 }
+    }
+
     /// Decides on a recipient.
     pub fn decide(&self, standing: &Standing) -> Answer {
         if standing.is_named {
@@ -49,16 +68,15 @@ impl Grounds<'_> {
             );
             return Answer { verdict: Verdict::Match, reason, p_missed_log10: None };
         }
-        let missed = self.missed_log10();
-        let (verdict, reason) = match self.doubt(standing, missed) {
+        let (verdict, reason) = match self.doubt(standing) {
             Some(doubt) => (Verdict::Inconclusive, doubt),
             None => (Verdict::NoMatch, format!("{COPY} would have shown, and it does not")),
         };
-        Answer { verdict, reason, p_missed_log10: Some(missed) }
+        Answer { verdict, reason, p_missed_log10: Some(self.missed_log10) }
     }
 
     /// Returns why the verdict cannot be "no match", and what would help; `None` where it can.
-    fn doubt(&self, standing: &Standing, missed: f64) -> Option<String> {
+    fn doubt(&self, standing: &Standing) -> Option<String> {
         let alone = p_log10(standing.score);
         if standing.p_value_log10 < SUSPICIOUS_LOG10 || alone < self.significance.log10() {
             return Some(
@@ -67,7 +85,7 @@ impl Grounds<'_> {
                     .into(),
             );
         }
-        if self.power == Power::KeyShows && self.evidence.fullness(self.pilot_amplitude) < LEAST_FULLNESS {
+        if self.is_mixed {
             return Some(
                 "a mark of this key is there, and its signs are weaker than those of one copy: copies of several \
                  recipients may be mixed, or features replaced, so that nobody can be ruled out; a part of the suspect \
@@ -75,24 +93,12 @@ impl Grounds<'_> {
                     .into(),
             );
         }
-        (missed >= MOST_MISSED_LOG10).then(|| {
+        (self.missed_log10 >= MOST_MISSED_LOG10).then(|| {
             format!(
                 "too few vertices match, or too roughly, for {COPY} to show: a larger piece of the suspect, or the \
                  edition of the reference that was marked, would show more"
             )
         })
-    }
-
-    /// Returns log₁₀ of the probability that the copy of one recipient has a score below the one
-    /// needed, or the least that is stated.
-    fn missed_log10(&self) -> f64 {
-        let expected = match self.power {
-            Power::Unmoved => return LEAST_MISSED_LOG10,
-            Power::KeyShows => self.evidence.expected_score(self.pilot_amplitude),
-            Power::Trial(score) => score,
-        };
-        let needed = needed_score(self.tried, self.significance);
-        survival::normal_log10((expected - needed) / TRIAL_DEVIATION).max(LEAST_MISSED_LOG10)
     }
 }
 
@@ -142,13 +148,7 @@ mod tests {
         let pilot_amplitude = Evidence::of_pilots(estimates).amplitude(&pilots(&key(), &part()));
         let candidates: Vec<Sequence> = tried.iter().map(|name| signs(name)).collect();
         let standings = name_recipients(&evidence, &candidates, SIGNIFICANCE);
-        let grounds = Grounds {
-            evidence: &evidence,
-            pilot_amplitude,
-            power,
-            tried: tried.len(),
-            significance: SIGNIFICANCE,
-        };
+        let grounds = Grounds::new(&evidence, pilot_amplitude, power, (tried.len(), SIGNIFICANCE));
         grounds.decide(standings.last().unwrap())
     }
 
@@ -193,13 +193,8 @@ mod tests {
     #[test]
     fn weak_evidence_is_never_no_match() {
         let evidence = Evidence::of_recipients(&mean_of(&["A"], 0.95, 4));
-        let grounds = |tried, significance| Grounds {
-            evidence: &evidence,
-            pilot_amplitude: 1.0,
-            power: Power::Trial(50.0),
-            tried,
-            significance,
-        };
+        let grounds =
+            |tried, significance| Grounds::new(&evidence, 1.0, Power::Trial(50.0), (tried, significance));
         let standing = |score: f64, p_value_log10: f64| {
             let agreement = evidence.agreement(&signs("B"));
             Standing { agreement, score, round: 1, p_value_log10, is_named: false }

@@ -13,20 +13,25 @@ pub fn fingerprint(report: &Report) -> Markup {
 }
 
 fn agreement(fingerprint: &FingerprintEntry) -> Markup {
-    let FingerprintEntry { recipient, key, patches: PatchAgreement { seen, clear } } = fingerprint;
+    let FingerprintEntry { recipient, key, patches } = fingerprint;
+    let recipient = recipient.as_ref().map(signs);
+    let patches = patches.map(|PatchAgreement { seen, clear }| {
+        html! {
+            (count(clear)) " of the " (count(seen)) " patches that were seen show the recipient by themselves, by "
+            (PatchAgreement::CLEAR) " standard deviations or more"
+        }
+    });
+    let rows = [
+        ("Signs of the recipient", recipient),
+        ("Signs of the key, which all copies have", Some(signs(key))),
+        ("Patches", patches),
+    ];
     html! {
         p {
             "Every coefficient of the mark has a secret sign that only the key can make. Those of a recipient who had no part \
              in this map agree with it as the flips of a coin do. "
         }
-        (table(&[
-            ("Signs of the recipient", Some(signs(recipient))),
-            ("Signs of the key, which all copies have", Some(signs(key))),
-            ("Patches", Some(html! {
-                (count(*clear)) " of the " (count(*seen)) " patches that were seen show the recipient by themselves, by "
-                (PatchAgreement::CLEAR) " standard deviations or more"
-            })),
-        ]))
+        (table(&rows.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>()))
     }
 }
 

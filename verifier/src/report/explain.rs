@@ -99,7 +99,8 @@ fn found(report: &Report) -> Vec<String> {
         report.read_from()
     ));
     if let Some(fingerprint) = &report.fingerprint {
-        sentences.push(format!("The recipient: {}.", fingerprint.recipient.to_text("of the recipient")));
+        let recipient = fingerprint.recipient.map(|signs| signs.to_text("of the recipient"));
+        sentences.extend(recipient.map(|text| format!("The recipient: {text}.")));
         sentences
             .push(format!("The key: {}, whoever the recipient is.", fingerprint.key.to_text("of the key")));
         sentences.extend(probabilities(report));

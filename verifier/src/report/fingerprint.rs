@@ -7,12 +7,12 @@ use serde::Serialize;
 /// The evidence about a fingerprint.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct FingerprintEntry {
-    /// The signs of the recipient.
-    pub recipient: SignAgreement,
+    /// The signs of the recipient; null where none is named.
+    pub recipient: Option<SignAgreement>,
     /// The pilots: the signs of the key alone, which all copies have.
     pub key: SignAgreement,
-    /// The patches whose signs were observed.
-    pub patches: PatchAgreement,
+    /// The patches whose signs were observed; null without a recipient.
+    pub patches: Option<PatchAgreement>,
 }
 
 /// How far secret signs agree with a suspect.
@@ -49,18 +49,19 @@ impl FingerprintEntry {
 
     /// Returns lines of text.
     pub(crate) fn to_lines(self) -> Vec<String> {
-        let FingerprintEntry { recipient, key, patches: PatchAgreement { seen, clear } } = self;
-        let least = PatchAgreement::CLEAR;
-        if recipient.signs == 0 {
+        if self.key.signs == 0 {
             return vec!["signs:        no secret sign shows, for nothing moved".into()];
         }
-        vec![
-            format!("signs:        {}", recipient.to_text("of the recipient")),
-            format!("key:          {}", key.to_text("of the key")),
+        let recipient =
+            self.recipient.map(|signs| format!("signs:        {}", signs.to_text("of the recipient")));
+        let key = format!("key:          {}", self.key.to_text("of the key"));
+        let patches = self.patches.map(|PatchAgreement { seen, clear }| {
+            let least = PatchAgreement::CLEAR;
             format!(
                 "patches:      {clear} of {seen} show the recipient by themselves, by {least} standard deviations or more"
-            ),
-        ]
+            )
+        });
+        recipient.into_iter().chain([key]).chain(patches).collect()
     }
 }
 

@@ -84,15 +84,19 @@ pub fn conclude_fingerprint(
     };
     let FingerprintEvidence { recipients, pilots, .. } = found;
     let Some((standing, answer)) = recipients.get(number) else {
-        let Decision { verdict, reason, .. } = Decision::without_message();
-        return report(request, seen, (verdict, reason), seconds, &|_| Vec::new());
+        let fingerprint = FingerprintEntry { recipient: None, key: (*pilots).into(), patches: None };
+        let answer = (Verdict::Inconclusive, without_recipient(fingerprint.shows_key()));
+        return Report {
+            fingerprint: Some(fingerprint),
+            ..report(request, seen, answer, seconds, &|_| Vec::new())
+        };
     };
     let recipient = request.recipient().expect("a fingerprint is that of a recipient");
     let scores = found.patch_scores(&request.key, recipient);
     let fingerprint = FingerprintEntry {
-        recipient: standing.agreement.into(),
+        recipient: Some(standing.agreement.into()),
         key: (*pilots).into(),
-        patches: PatchAgreement::of(&scores),
+        patches: Some(PatchAgreement::of(&scores)),
     };
     Report {
         p_value_log10: Some(standing.p_value_log10),
@@ -100,6 +104,14 @@ pub fn conclude_fingerprint(
         p_missed_log10: answer.p_missed_log10,
         fingerprint: Some(fingerprint),
         ..report(request, seen, (answer.verdict, answer.reason.clone()), seconds, &|_| scores.clone())
+    }
+}
+
+fn without_recipient(shows_key: bool) -> String {
+    let remedy = "name a recipient, or give the folder with the records of all copies";
+    match shows_key {
+        true => format!("a mark of this key is there, and no recipient is named: {remedy}"),
+        false => format!("no mark of this key shows by itself, and no recipient is named: {remedy}"),
     }
 }
 

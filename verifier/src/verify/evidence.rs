@@ -120,7 +120,7 @@ fn of_fingerprints(
     let standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
     let pilot_amplitude = Evidence::of_pilots(&seen.estimates).amplitude(&pilots);
     let evidence = Evidence::of_recipients(&seen.estimates);
-    let grounds = Grounds { evidence: &evidence, pilot_amplitude, power, tried, significance };
+    let grounds = Grounds::new(&evidence, pilot_amplitude, power, (tried, significance));
     let decide = |standing: Standing| (standing, grounds.decide(&standing));
     let recipients = standings.into_iter().map(decide).collect();
     let pilots = seen.key_agreement(&pilots);
