@@ -269,7 +269,9 @@ fn foreign_members_that_hold_places_are_warned_of_on_all_three_ways() {
         for said in said {
             assert_eq!(said.matches(warned).count(), times, "{source}: {said}");
         }
-        ["ref.gpkg", "record.json"].map(|name| fs::remove_file(host.path(name)).unwrap());
+        for name in ["ref.gpkg", "record.json"] {
+            fs::remove_file(host.path(name)).unwrap();
+        }
     }
 }
 

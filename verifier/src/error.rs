@@ -7,7 +7,7 @@ use crate::{
 use gdal::errors::GdalError;
 use meshmark_core::{counted, options::Spelling};
 use meshmark_dataset::{Error as MapError, marking::NotMoved, wkb::WkbError};
-use std::{io, path::PathBuf, string::FromUtf8Error};
+use std::{io, path::PathBuf, process::ExitStatus, string::FromUtf8Error};
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -174,6 +174,43 @@ pub enum Error {
     #[error("the output folder {} cannot be made ({source}): name one that can be", path.display())]
     NoFolder { path: PathBuf, source: io::Error },
 
+    // --- an examination that did not end by itself ---
+    #[error(
+        "the examination of the suspect {} was stopped, as it needs more memory than its limit of {megabytes} MB: give a \
+         larger --memory-limit if you trust the file",
+        path.display()
+    )]
+    MemoryLimit { path: PathBuf, megabytes: u64 },
+    #[error(
+        "the examination of the suspect {} was stopped, as it takes longer than its limit of {seconds} s: give a larger \
+         --time-limit if you trust the file",
+        path.display()
+    )]
+    TimeLimit { path: PathBuf, seconds: u64 },
+    #[error(
+        "the examination of the suspect {} was stopped, as it writes a file larger than its limit of {megabytes} MB: give \
+         a larger --memory-limit, which limits files, too, if you trust the suspect",
+        path.display()
+    )]
+    FileLimit { path: PathBuf, megabytes: u64 },
+    #[error(
+        "the examination of the suspect {} was killed from outside, as a machine without free memory does: give a \
+         --memory-limit below {megabytes} MB, or free some memory",
+        path.display()
+    )]
+    Killed { path: PathBuf, megabytes: u64 },
+    #[error(
+        "the examination of the suspect {} ended early ({status}), as the file makes a library fail that reads it, or \
+         needs more memory than its limit of {megabytes} MB: convert it with another program and verify the copy, or give \
+         a larger --memory-limit if you trust the file",
+        path.display()
+    )]
+    EarlyEnd { path: PathBuf, status: ExitStatus, megabytes: u64 },
+    #[error(
+        "no process can be started that examines the suspect ({source}): end other programs, and verify again"
+    )]
+    NotConfined { source: io::Error },
+
     // --- one of many copies ---
     #[error("\"{recipient}\": {source}")]
     Copy { recipient: String, source: Box<Error> },
@@ -255,6 +292,12 @@ impl Error {
             | Ogr2ogr { .. }
             | MapChanged => ExitCode::Unreadable,
             Unwritten { .. } | Uncopied { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
+            MemoryLimit { .. }
+            | TimeLimit { .. }
+            | FileLimit { .. }
+            | Killed { .. }
+            | EarlyEnd { .. }
+            | NotConfined { .. } => ExitCode::Stopped,
             Copy { source, .. } | Stopped { source, .. } => source.exit_code(),
             _ => ExitCode::Usage,
         }

@@ -105,6 +105,32 @@ fn a_shapefile_without_its_index_is_read_and_gets_none() {
     assert_untouched(&folder, "suspect.shp");
 }
 
+/// In the index the second record is the first one again: what GDAL reads follows the index.
+#[test]
+fn the_index_of_a_shapefile_is_read_and_not_made_anew() {
+    let folder = TempDir::new().unwrap();
+    converted(&folder, "suspect.shp", &[]);
+    let index = folder.path().join("suspect.shx");
+    let mut bytes = fs::read(&index).unwrap();
+    let first: Vec<u8> = bytes[100..108].into();
+    bytes[100..].chunks_mut(8).for_each(|record| record.copy_from_slice(&first));
+    fs::write(&index, bytes).unwrap();
+    let before = content(folder.path());
+    assert_answer(&folder.path().join("suspect.shp"), 3, "INCONCLUSIVE");
+    assert!(content(folder.path()) == before);
+}
+
+#[test]
+fn a_zipped_shapefile_and_a_folder_without_an_index_are_read() {
+    let folder = TempDir::new().unwrap();
+    converted(&folder, "suspect.shp.zip", &["-f", "ESRI Shapefile"]);
+    assert_untouched(&folder, "suspect.shp.zip");
+    let folder = TempDir::new().unwrap();
+    converted(&folder, "many", &["-f", "ESRI Shapefile"]);
+    fs::remove_file(folder.path().join("many/buildings.shx")).unwrap();
+    assert_untouched(&folder, "many");
+}
+
 #[test]
 fn other_formats_and_folders_are_left_as_they_were() {
     for (name, more) in [

@@ -40,6 +40,12 @@ pub(super) fn files_of(path: &Path) -> io::Result<Vec<BelongingFile>> {
     Ok(files)
 }
 
+/// Returns the size of a map with all its files; 0 for what is no local file or folder.
+pub(crate) fn size_of(path: &Path) -> u64 {
+    let size = |file: BelongingFile| file.path.metadata().map_or(0, |metadata| metadata.len());
+    files_of(path).unwrap_or_default().into_iter().map(size).sum()
+}
+
 /// Appends the other files with the same name and any extension, for a format that has such files.
 fn companions(path: &Path, files: &mut Vec<BelongingFile>) -> io::Result<()> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();

@@ -13,3 +13,5 @@ mod tables;
 pub mod texts;
 pub mod unsuitable;
 pub mod versions;
+
+pub(crate) use belonging_files::size_of;

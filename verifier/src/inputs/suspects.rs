@@ -66,6 +66,7 @@ fn open_suspect(suspect: &PrivateCopy) -> Result<Dataset> {
     if svg::is_named(copy) {
         return svg::open(copy, path);
     }
+    restore_indices(copy).map_err(|source| Error::NoOption { source })?;
     let place = highest_zoom(copy).unwrap_or_else(|| copy.into());
     let dataset = open_plain(&place, &[]).map_err(|failure| suspect_formats::unopened(path, failure))?;
     check_plain(suspect, &dataset)?;
@@ -111,27 +112,42 @@ fn forbid_network() -> gdal::errors::Result<()> {
         ("ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW", "NO"),
         ("OGR_SQLITE_LOAD_EXTENSIONS", ""),
         ("SPATIALITE_SECURITY", "strict"),
-        ("SHAPE_RESTORE_SHX", "YES"), // beside the copy
     ] {
         gdal::config::set_thread_local_config_option(option, value)?;
     }
     Ok(())
 }
 
+/// Makes the lost indices of Shapefiles anew, beside the copy. GDAL would replace those that are there.
+fn restore_indices(copy: &Path) -> gdal::errors::Result<()> {
+    const RESTORE: &str = "SHAPE_RESTORE_SHX";
+    let lost = |shape: &PathBuf| !["shx", "SHX"].iter().any(|ending| shape.with_extension(ending).exists());
+    for shape in files_with_ending(copy, "shp").iter().filter(|shape| lost(shape)) {
+        gdal::config::set_thread_local_config_option(RESTORE, "YES")?;
+        drop(open_plain(shape, &[])); // the reason of a failure comes later
+        gdal::config::clear_thread_local_config_option(RESTORE)?;
+    }
+    Ok(())
+}
+
+/// Returns a file, or the files in a folder, if they have this ending.
+fn files_with_ending(path: &Path, ending: &str) -> Vec<PathBuf> {
+    let has_ending =
+        |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) && path.is_file();
+    match path.read_dir() {
+        Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| has_ending(p)).collect(),
+        Err(_) => has_ending(path).then(|| path.into()).into_iter().collect(),
+    }
+}
+
 /// Refuses MapInfo tables that refer to other tables, which may be anywhere.
 fn check_table(suspect: &PrivateCopy) -> Result<()> {
-    let path = suspect.copy();
-    let is_table = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tab"));
-    let tables: Vec<PathBuf> = match path.read_dir() {
-        Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| is_table(p)).collect(),
-        Err(_) => is_table(path).then(|| path.into()).into_iter().collect(),
-    };
-    for table in tables.iter().filter(|table| table.is_file()) {
-        let Ok(bytes) = std::fs::read(table) else { continue }; // GDAL reports the reason later
+    for table in files_with_ending(suspect.copy(), "tab") {
+        let Ok(bytes) = std::fs::read(&table) else { continue }; // GDAL reports the reason later
         let text = String::from_utf8_lossy(&bytes).to_lowercase();
         let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
         if seamless || text.contains("create view") {
-            return Err(Error::OtherTables { path: suspect.original_of(table) });
+            return Err(Error::OtherTables { path: suspect.original_of(&table) });
         }
     }
     Ok(())

@@ -1,4 +1,5 @@
 //! The command as the tests of suspects run it.
+#![allow(dead_code)] // each test uses a part
 
 use std::{
     fs,
@@ -11,9 +12,10 @@ pub fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
 }
 
-/// What `meshmark verify` says of a suspect against the test vectors.
-pub fn verify(suspect: &Path) -> (Option<i32>, String) {
-    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_meshmark"))
+/// `meshmark verify` of a suspect against the test vectors.
+pub fn command(suspect: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));
+    command
         .env("GDAL_DRIVER_PATH", "none")
         .args(["verify", "--key"])
         .arg(fixture("vectors/key.json"))
@@ -21,10 +23,19 @@ pub fn verify(suspect: &Path) -> (Option<i32>, String) {
         .arg(fixture("vectors/record.json"))
         .arg("--reference")
         .arg(fixture("kotka.gpkg"))
-        .arg(suspect)
-        .output()
-        .unwrap();
-    (status.code(), [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat())
+        .arg(suspect);
+    command
+}
+
+/// The exit code of a command, and what it prints.
+pub fn ended(output: Output) -> (Option<i32>, String) {
+    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (output.status.code(), text.concat())
+}
+
+/// What `meshmark verify` says of a suspect against the test vectors.
+pub fn verify(suspect: &Path) -> (Option<i32>, String) {
+    ended(command(suspect).output().unwrap())
 }
 
 /// Asserts an exit code and a part of the text.
