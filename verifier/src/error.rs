@@ -137,11 +137,11 @@ pub enum Error {
     #[error("the suspect {} is not a file here: give a local file", path.display())]
     NoFile { path: PathBuf },
     #[error(
-        "the suspect {} cannot be copied to {} for its examination ({source}): make room there, or name another folder \
+        "the {what} {} cannot be copied to {} for its examination ({source}): make room there, or name another folder \
          by TMPDIR",
         path.display(), place.display()
     )]
-    Uncopied { path: PathBuf, place: PathBuf, source: io::Error },
+    Uncopied { what: &'static str, path: PathBuf, place: PathBuf, source: io::Error },
     #[error("the suspect {} was changed while it was examined: verify it again when nobody writes to it", path.display())]
     SuspectChanged { path: PathBuf },
     #[error("GDAL takes no option: {source}")]
@@ -156,6 +156,18 @@ pub enum Error {
         path.display()
     )]
     VirtualTable { path: PathBuf, table: String },
+    #[error(
+        "the {what} {} has a journal of an unfinished transaction over several databases, which names another file: open \
+         it with SQLite where it was written, and verify it then",
+        path.display()
+    )]
+    SuperJournal { what: &'static str, path: PathBuf },
+    #[error(
+        "the {what} {} has the journal of an unfinished transaction, which cannot be rolled back ({source}): verify the \
+         file without its journal, or repair it with SQLite's .recover",
+        path.display()
+    )]
+    Journal { what: &'static str, path: PathBuf, source: rusqlite::Error },
     #[error("the map as a GeoPackage cannot be read: {source}")]
     StagedUnread { source: Cause },
     #[error("ogr2ogr cannot copy {} to {format}: {reason}", path.display())]
@@ -288,6 +300,8 @@ impl Error {
             | OtherTables { .. }
             | Unread { .. }
             | VirtualTable { .. }
+            | SuperJournal { .. }
+            | Journal { .. }
             | StagedUnread { .. }
             | Ogr2ogr { .. }
             | MapChanged => ExitCode::Unreadable,

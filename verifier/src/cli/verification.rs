@@ -26,7 +26,7 @@ const BY_SIGNAL: i32 = 128;
 pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
-    let suspect = PrivateCopy::of(&args.suspect)?;
+    let suspect = PrivateCopy::of("suspect", &args.suspect)?;
     let arguments = command_line::of_examination(suspect.folder().as_os_str());
     let places = (args.suspect.as_path(), suspect.folder());
     let bar = Bar::default();

@@ -54,7 +54,9 @@ fn companions(path: &Path, files: &mut Vec<BelongingFile>) -> io::Result<()> {
     }
     for entry in folder_of(path).read_dir()? {
         let file = path.with_file_name(entry?.file_name());
-        if file != path && file.is_file() && file.file_stem() == path.file_stem() {
+        // The metadata of a.shp are in a.shp.xml.
+        let belongs = [path.file_stem(), path.file_name()].contains(&file.file_stem());
+        if file != path && file.is_file() && belongs {
             let name = file.file_name().unwrap_or_default().into();
             files.push(BelongingFile { name, path: file });
         }
@@ -62,7 +64,12 @@ fn companions(path: &Path, files: &mut Vec<BelongingFile>) -> io::Result<()> {
     Ok(())
 }
 
-fn with_ending(path: &Path, ending: &str) -> PathBuf {
+/// Returns whether logs belong to a map, which then is a database.
+pub(super) fn has_logs(path: &Path) -> bool {
+    path.canonicalize().is_ok_and(|target| LOGS.iter().any(|log| with_ending(&target, log).is_file()))
+}
+
+pub(super) fn with_ending(path: &Path, ending: &str) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(ending);
     name.into()

@@ -4,6 +4,7 @@
 mod belonging_files;
 pub mod digests;
 pub mod gdal_failures;
+mod journal;
 pub mod maps;
 pub mod private_copy;
 mod suspect_formats;

@@ -1,8 +1,8 @@
-//! The private copy of a suspect. GDAL and SQLite write to what they read, also when they only read:
+//! The private copy of a suspect, or of a reference with logs. GDAL and SQLite write to what they read, also when they only read:
 //! a log is merged into its database and deleted, a lost index is made anew. They therefore never
 //! see the suspect itself, which stays as it was.
 
-use super::belonging_files::{BelongingFile, files_of};
+use super::belonging_files::{BelongingFile, files_of, with_ending};
 use crate::{Error, Result};
 use meshmark_dataset::workplace::Workplace;
 use std::{
@@ -32,14 +32,14 @@ impl PrivateCopy {
     ///
     /// # Errors
     /// Fails for what is neither a file nor a folder, and where it cannot be read or copied.
-    pub fn of(original: &Path) -> Result<Self> {
+    pub fn of(what: &'static str, original: &Path) -> Result<Self> {
         if !original.is_file() && !original.is_dir() {
             return Err(Error::NoFile { path: original.into() });
         }
         let unread = |source: io::Error| Error::Undigested { path: original.into(), source };
         let place = env::temp_dir();
         let uncopied =
-            |source: io::Error| Error::Uncopied { path: original.into(), place: place.clone(), source };
+            |source: io::Error| Error::Uncopied { what, path: original.into(), place: place.clone(), source };
         let workplace = Workplace::new(&place)?;
         let files = files_of(original).map_err(unread)?;
         workplace.subfolder(SUBFOLDER)?;
@@ -84,6 +84,11 @@ impl PrivateCopy {
     /// Returns the path of the copy, for reading.
     pub fn copy(&self) -> &Path {
         &self.copy
+    }
+
+    /// Returns the path of the log of a database, which need not exist.
+    pub(super) fn copy_of_log(&self, ending: &str) -> PathBuf {
+        with_ending(&self.copy, ending)
     }
 
     /// Returns the path of the suspect's own file for one of the copy.

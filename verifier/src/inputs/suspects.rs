@@ -2,6 +2,7 @@
 
 use super::{
     gdal_failures::{GdalFailure, forget_failure, named_as},
+    journal,
     maps::{Reading, failed, first_crs, open_with, selection},
     private_copy::PrivateCopy,
     suspect_formats, svg, tables,
@@ -66,6 +67,7 @@ fn open_suspect(suspect: &PrivateCopy) -> Result<Dataset> {
     if svg::is_named(copy) {
         return svg::open(copy, path);
     }
+    journal::roll_back("suspect", suspect)?;
     restore_indices(copy).map_err(|source| Error::NoOption { source })?;
     let place = highest_zoom(copy).unwrap_or_else(|| copy.into());
     let dataset = open_plain(&place, &[]).map_err(|failure| suspect_formats::unopened(path, failure))?;
