@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{command, ended, fixture, write};
+use common::{child_of, command, ended, fixture, write};
 use landlock::{AccessFs, Ruleset, RulesetAttr, RulesetStatus};
 use meshmark_verifier::confinement::{Limits, enter};
 use rustix::process::{Pid, Signal, kill_process};
@@ -115,12 +115,7 @@ fn endless(folder: &TempDir, temporary: &TempDir) -> (Child, Pid) {
     let mut command = command(&suspect);
     command.env("TMPDIR", temporary.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let parent = command.spawn().unwrap();
-    let children = format!("/proc/{0}/task/{0}/children", parent.id());
-    let child_of = || fs::read_to_string(&children).unwrap().trim().parse().ok().and_then(Pid::from_raw);
-    while child_of().is_none() {
-        sleep(Duration::from_millis(5));
-    }
-    let child = child_of().expect("it runs without end");
+    let child = Pid::from_raw(child_of(&parent)).unwrap();
     (parent, child)
 }
 

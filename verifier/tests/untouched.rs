@@ -7,8 +7,9 @@ use common::{assert_answer, fixture, verify};
 use std::{
     collections::BTreeMap,
     fs,
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
 };
 use tempfile::TempDir;
 
@@ -241,4 +242,52 @@ fn a_broken_suspect_is_named_by_its_own_path() {
         assert_eq!(code, Some(5), "{text}");
         assert!(text.contains(path.to_str().unwrap()) && !text.contains(".meshmark-write-"), "{text}");
     }
+}
+
+#[test]
+fn a_suspect_in_a_folder_that_cannot_be_written_to_is_read() {
+    let folder = TempDir::new().unwrap();
+    with_log(&folder);
+    let mode = |mode| fs::set_permissions(folder.path(), fs::Permissions::from_mode(mode)).unwrap();
+    mode(0o555);
+    assert_untouched(&folder, "suspect.gpkg");
+    mode(0o755);
+}
+
+#[test]
+fn a_suspect_that_changes_during_its_examination_has_no_report() {
+    let [folder, results] = [(); 2].map(|()| TempDir::new().unwrap());
+    with_log(&folder);
+    let suspect = folder.path().join("suspect.gpkg");
+    for changed in ["suspect.gpkg-wal", "suspect.gpkg"] {
+        let report = results.path().join("report.html");
+        let mut command = common::command(&suspect);
+        command.arg("--report").arg(&report).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let running = command.spawn().unwrap();
+        common::child_of(&running); // it has the copy
+        fs::remove_file(folder.path().join(changed)).unwrap();
+        let (code, text) = common::ended(running.wait_with_output().unwrap());
+        assert_eq!(code, Some(5), "{text}");
+        assert!(text.contains(suspect.to_str().unwrap()) && !report.exists(), "{text}");
+    }
+}
+
+/// Mounts a small disk that only this command sees, as any user may where namespaces are allowed.
+#[test]
+fn a_full_folder_of_temporary_files_is_named() {
+    let small = TempDir::new().unwrap();
+    let mount = "mount -t tmpfs -o size=64k tmpfs \"$TMPDIR\"";
+    let run = |script: &str| {
+        let verify = common::command(&fixture("vectors/marked.gpkg"));
+        let mut namespace = Command::new("unshare");
+        namespace.args(["-rm", "sh", "-c", script, "sh"]).arg(verify.get_program()).args(verify.get_args());
+        common::ended(namespace.env("TMPDIR", small.path()).output().unwrap())
+    };
+    if run(mount).0 != Some(0) {
+        return eprintln!("this machine allows no namespaces, and its disks are not small");
+    }
+    let left = "code=$?; ls -A \"$TMPDIR\"; exit $code";
+    let (code, text) = run(&format!("{mount} && \"$@\"; {left}"));
+    assert_eq!(code, Some(7), "{text}");
+    assert!(text.contains("TMPDIR") && text.contains("marked.gpkg") && text.lines().count() == 1, "{text}");
 }

@@ -4,7 +4,9 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::{Child, Command, Output},
+    thread::sleep,
+    time::Duration,
 };
 use tempfile::TempDir;
 
@@ -42,6 +44,17 @@ pub fn verify(suspect: &Path) -> (Option<i32>, String) {
 pub fn assert_answer(suspect: &Path, code: i32, part: &str) {
     let (found, text) = verify(suspect);
     assert!(found == Some(code) && text.contains(part), "{}: {found:?}\n{text}", suspect.display());
+}
+
+/// Waits until a command runs its child, and returns the number of that process.
+pub fn child_of(parent: &Child) -> i32 {
+    let children = format!("/proc/{0}/task/{0}/children", parent.id());
+    loop {
+        match fs::read_to_string(&children).expect("the command runs").trim().parse() {
+            Ok(child) => return child,
+            Err(_) => sleep(Duration::from_millis(5)),
+        }
+    }
 }
 
 pub fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
