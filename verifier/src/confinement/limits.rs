@@ -5,7 +5,7 @@ use rustix::{
     process::{Resource, Rlimit, getrlimit, setrlimit},
     system::sysinfo,
 };
-use std::{fs, io, path::Path, time::Duration};
+use std::{fs, io, path::Path, thread::available_parallelism, time::Duration};
 
 const MB: u64 = 1_000_000;
 
@@ -14,9 +14,11 @@ const MB: u64 = 1_000_000;
 const LEAST_SECONDS: u64 = 600;
 const BYTES_PER_SECOND: u64 = 200_000;
 
-/// The memory for small files, and its growth with their size. A vertex takes two bytes of a very
-/// compact file, and less than 800 of memory.
-const LEAST_BYTES: u64 = 1_000 * MB;
+/// The memory for small files, and its growth with the processors and with the size of the files. The
+/// matrices of a usual patch take 10 MB. A vertex takes two bytes of a very compact file, and less
+/// than 800 of memory.
+const LEAST_BYTES: u64 = 2_000 * MB;
+const BYTES_PER_PROCESSOR: u64 = 50 * MB;
 const BYTES_PER_BYTE: u64 = 400;
 
 /// Where Linux names the limit of the memory of a container.
@@ -40,7 +42,8 @@ impl Limits {
         files: impl IntoIterator<Item = &'a Path>,
     ) -> Self {
         let bytes: u64 = files.into_iter().map(size_of).sum();
-        let memory = LEAST_BYTES.saturating_add(bytes.saturating_mul(BYTES_PER_BYTE));
+        let of_files = bytes.saturating_mul(BYTES_PER_BYTE);
+        let memory = (LEAST_BYTES + BYTES_PER_PROCESSOR * processors()).saturating_add(of_files);
         let memory_mb = memory_mb.unwrap_or_else(|| memory.min(memory_of_machine() / 2) / MB);
         let time_s = time_s.unwrap_or(LEAST_SECONDS + bytes / BYTES_PER_SECOND);
         Limits { memory_mb: memory_mb.min(inherited() / MB), time_s }
@@ -64,6 +67,10 @@ impl Limits {
         }
         Ok(())
     }
+}
+
+fn processors() -> u64 {
+    available_parallelism().map_or(1, |count| count.get() as u64)
 }
 
 /// Returns the memory of this machine or container, in bytes.
@@ -94,7 +101,7 @@ mod tests {
         let missing = folder.path().join("b");
         let by_default = Limits::new(None, None, [file.as_path(), file.as_path(), missing.as_path()]);
         let half = memory_of_machine() / 2 / MB;
-        assert_eq!(by_default, Limits { memory_mb: 1800.min(half), time_s: 610 });
+        assert_eq!(by_default, Limits { memory_mb: (2800 + 50 * processors()).min(half), time_s: 610 });
         fs::File::options().write(true).open(&file).unwrap().set_len(1 << 40).unwrap();
         assert_eq!(Limits::new(None, None, [file.as_path()]).memory_mb, half);
     }
