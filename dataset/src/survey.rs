@@ -3,7 +3,7 @@
 use crate::{
     CoordinateSystem, Error, Geometries, Result,
     chains::{Chains, read_geometry},
-    crs::{self, Assumption, reproject},
+    crs::{self, reproject},
     extent::Extent,
     labels,
     left_out::{Faults, LeftOut, MISSING, is_there},
@@ -112,21 +112,29 @@ impl Numbers {
         self.brought(target, None)
     }
 
-    /// Returns the map in the CRS `target` as [`Numbers::in_crs`] does, with all numbers in the CRS
-    /// of an assumption.
+    /// Returns the map in the CRS `target` as [`Numbers::in_crs`] does, with all numbers in another
+    /// CRS than the layers have, whose axes may be swapped.
     ///
     /// # Errors
     /// Returns the errors of [`Numbers::in_crs`].
-    pub fn assumed(&self, assumption: &Assumption, target: &CoordinateSystem) -> Result<Survey> {
-        self.brought(target, Some(assumption))
+    pub fn assumed(
+        &self,
+        (crs, axes_swapped): (&CoordinateSystem, bool),
+        target: &CoordinateSystem,
+    ) -> Result<Survey> {
+        self.brought(target, Some((crs, axes_swapped)))
     }
 
-    fn brought(&self, target: &CoordinateSystem, assumption: Option<&Assumption>) -> Result<Survey> {
+    fn brought(
+        &self,
+        target: &CoordinateSystem,
+        assumed: Option<(&CoordinateSystem, bool)>,
+    ) -> Result<Survey> {
         let mut found = self.found.clone();
         for Part { layer, crs, coords, labels, polylines } in &self.parts {
-            let crs = assumption.map(|assumption| &assumption.crs).or(crs.as_ref());
+            let crs = assumed.map(|(crs, _)| crs).or(crs.as_ref());
             let bring = |points: &mut [[f64; 2]]| {
-                if assumption.is_some_and(|assumption| assumption.axes_swapped) {
+                if assumed.is_some_and(|(_, axes_swapped)| axes_swapped) {
                     points.iter_mut().for_each(|point| point.swap(0, 1));
                 }
                 reproject(points, crs, target, layer)

@@ -7,7 +7,7 @@ use crate::{
 use gdal::errors::GdalError;
 use meshmark_core::{counted, options::Spelling};
 use meshmark_dataset::{Error as MapError, marking::NotMoved, wkb::WkbError};
-use std::{io, path::PathBuf, string::FromUtf8Error};
+use std::{io, path::PathBuf, process::ExitStatus, string::FromUtf8Error};
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -137,11 +137,11 @@ pub enum Error {
     #[error("the suspect {} is not a file here: give a local file", path.display())]
     NoFile { path: PathBuf },
     #[error(
-        "the suspect {} cannot be copied to {} for its examination ({source}): make room there, or name another folder \
+        "the {what} {} cannot be copied to {} for its examination ({source}): make room there, or name another folder \
          by TMPDIR",
         path.display(), place.display()
     )]
-    Uncopied { path: PathBuf, place: PathBuf, source: io::Error },
+    Uncopied { what: &'static str, path: PathBuf, place: PathBuf, source: io::Error },
     #[error("the suspect {} was changed while it was examined: verify it again when nobody writes to it", path.display())]
     SuspectChanged { path: PathBuf },
     #[error("GDAL takes no option: {source}")]
@@ -156,6 +156,18 @@ pub enum Error {
         path.display()
     )]
     VirtualTable { path: PathBuf, table: String },
+    #[error(
+        "the {what} {} has a journal of an unfinished transaction over several databases, which names another file: open \
+         it with SQLite where it was written, and verify it then",
+        path.display()
+    )]
+    SuperJournal { what: &'static str, path: PathBuf },
+    #[error(
+        "the {what} {} has the journal of an unfinished transaction, which cannot be rolled back ({source}): verify the \
+         file without its journal, or repair it with SQLite's .recover",
+        path.display()
+    )]
+    Journal { what: &'static str, path: PathBuf, source: rusqlite::Error },
     #[error("the map as a GeoPackage cannot be read: {source}")]
     StagedUnread { source: Cause },
     #[error("ogr2ogr cannot copy {} to {format}: {reason}", path.display())]
@@ -173,6 +185,43 @@ pub enum Error {
     Unprinted { source: io::Error },
     #[error("the output folder {} cannot be made ({source}): name one that can be", path.display())]
     NoFolder { path: PathBuf, source: io::Error },
+
+    // --- an examination that did not end by itself ---
+    #[error(
+        "the examination of the suspect {} was stopped, as it needs more memory than its limit of {megabytes} MB: give a \
+         larger --memory-limit if you trust the file",
+        path.display()
+    )]
+    MemoryLimit { path: PathBuf, megabytes: u64 },
+    #[error(
+        "the examination of the suspect {} was stopped, as it takes longer than its limit of {seconds} s: give a larger \
+         --time-limit if you trust the file",
+        path.display()
+    )]
+    TimeLimit { path: PathBuf, seconds: u64 },
+    #[error(
+        "the examination of the suspect {} was stopped, as it writes a file larger than its limit of {megabytes} MB: give \
+         a larger --memory-limit, which limits files, too, if you trust the suspect",
+        path.display()
+    )]
+    FileLimit { path: PathBuf, megabytes: u64 },
+    #[error(
+        "the examination of the suspect {} was killed from outside, as a machine without free memory does: give a \
+         --memory-limit below {megabytes} MB, or free some memory",
+        path.display()
+    )]
+    Killed { path: PathBuf, megabytes: u64 },
+    #[error(
+        "the examination of the suspect {} ended early ({status}), as the file makes a library fail that reads it, or \
+         needs more memory than its limit of {megabytes} MB: convert it with another program and verify the copy, or give \
+         a larger --memory-limit if you trust the file",
+        path.display()
+    )]
+    EarlyEnd { path: PathBuf, status: ExitStatus, megabytes: u64 },
+    #[error(
+        "no process can be started that examines the suspect ({source}): end other programs, and verify again"
+    )]
+    NotConfined { source: io::Error },
 
     // --- one of many copies ---
     #[error("\"{recipient}\": {source}")]
@@ -251,10 +300,18 @@ impl Error {
             | OtherTables { .. }
             | Unread { .. }
             | VirtualTable { .. }
+            | SuperJournal { .. }
+            | Journal { .. }
             | StagedUnread { .. }
             | Ogr2ogr { .. }
             | MapChanged => ExitCode::Unreadable,
             Unwritten { .. } | Uncopied { .. } | Unprinted { .. } | NoFolder { .. } => ExitCode::Unwritable,
+            MemoryLimit { .. }
+            | TimeLimit { .. }
+            | FileLimit { .. }
+            | Killed { .. }
+            | EarlyEnd { .. }
+            | NotConfined { .. } => ExitCode::Stopped,
             Copy { source, .. } | Stopped { source, .. } => source.exit_code(),
             _ => ExitCode::Usage,
         }

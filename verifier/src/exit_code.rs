@@ -19,11 +19,13 @@ pub enum ExitCode {
     TooLarge = 6,
     /// An output cannot be written.
     Unwritable = 7,
+    /// A limit, or a fault of a library, ended the examination.
+    Stopped = 8,
 }
 
 impl ExitCode {
     /// All exit codes.
-    pub const ALL: [ExitCode; 8] = [
+    pub const ALL: [ExitCode; 9] = [
         ExitCode::Match,
         ExitCode::NoMatch,
         ExitCode::Usage,
@@ -32,6 +34,7 @@ impl ExitCode {
         ExitCode::Unreadable,
         ExitCode::TooLarge,
         ExitCode::Unwritable,
+        ExitCode::Stopped,
     ];
 
     /// Returns the meaning of the code for `meshmark verify`.
@@ -45,6 +48,7 @@ impl ExitCode {
             ExitCode::Unreadable => "unreadable input",
             ExitCode::TooLarge => "too large",
             ExitCode::Unwritable => "an output cannot be written",
+            ExitCode::Stopped => "stopped at a limit",
         }
     }
 }

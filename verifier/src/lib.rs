@@ -2,10 +2,12 @@
 //!
 //! The data flows one way: [`inputs`] → [`verify`](mod@verify), which passes numbers to
 //! `meshmark-detection` → [`report`] → [`html`] → [`outputs`]. [`compare`] measures the effect of marking on a
-//! map, [`distribute`] marks a map for many recipients.
+//! map, [`distribute`] marks a map for many recipients. [`confinement`] has the process that examines a
+//! suspect.
 #![forbid(unsafe_code)]
 
 pub mod compare;
+pub mod confinement;
 pub mod distribute;
 mod error;
 mod exit_code;

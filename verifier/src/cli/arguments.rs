@@ -1,6 +1,6 @@
 //! Subcommands and their flags. The table of marking options generates the flags of those options.
 
-use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum, value_parser};
 use meshmark_core::options::{OPTIONS, Spelling};
 use meshmark_detection::{Demodulator, registration::Start};
 use meshmark_verifier::ExitCode;
@@ -18,6 +18,9 @@ pub(super) struct Cli {
     pub(super) command: Subcommands,
 }
 
+/// The name of the subcommand that `verify` runs as its child.
+pub(super) const EXAMINE: &str = "examine";
+
 #[derive(Subcommand)]
 pub(super) enum Subcommands {
     /// Make a secret key and write it to a new file that only you can read
@@ -28,6 +31,15 @@ pub(super) enum Subcommands {
     /// Determine whether a suspect map carries a mark
     #[command(long_about = about_verify())]
     Verify(Box<VerifyArgs>),
+    /// Examine a suspect for `verify`, as its child, in the folder of the private copy
+    #[command(name = EXAMINE, hide = true)]
+    Examine {
+        /// The folder, to which the results are written
+        folder: PathBuf,
+        /// The arguments of `verify`
+        #[command(flatten)]
+        args: Box<VerifyArgs>,
+    },
     /// Measure the effect of marking on a map: displacement, angles, areas, topology
     ///
     /// Features correspond by their order in each layer, vertices by their order in each feature.
@@ -178,6 +190,14 @@ pub(super) struct VerifyArgs {
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Most memory of the examination, and the largest file that it writes; by default 1000 MB, 50 MB
+    /// for each processor and 400 times the size of the maps, at most half of the machine's memory
+    #[arg(long, value_name = "MB", value_parser = value_parser!(u64).range(1..))]
+    pub(super) memory_limit: Option<u64>,
+    /// Longest time of the examination; by default ten minutes, and one more for every 12 MB of the
+    /// maps
+    #[arg(long, value_name = "SECONDS", value_parser = value_parser!(u64).range(1..))]
+    pub(super) time_limit: Option<u64>,
     #[command(flatten)]
     pub(super) marking: MarkingFlags,
 }

@@ -1,6 +1,14 @@
 //! The command line in a report, which a shell accepts.
 
+use super::arguments::EXAMINE;
 use meshmark_verifier::words::quoted;
+use std::ffi::{OsStr, OsString};
+
+/// Returns the arguments of the child that examines the suspect of this `verify` in a folder.
+pub fn of_examination(folder: &OsStr) -> impl Iterator<Item = OsString> {
+    let own = std::env::args_os().skip(2); // without the names of the program and the subcommand
+    [EXAMINE.into(), folder.into()].into_iter().chain(own)
+}
 
 /// Returns the command line of this process in the form that a report shows.
 pub fn own() -> String {
@@ -8,10 +16,14 @@ pub fn own() -> String {
 }
 
 /// Returns a command line without options that only name outputs, and with the report as
-/// `report.html`.
+/// `report.html`. That of a child is the one of its parent.
 fn shown(arguments: impl Iterator<Item = String>) -> String {
     let mut words = vec!["meshmark".to_string()];
-    let mut arguments = arguments.skip(1);
+    let mut arguments = arguments.skip(1).peekable();
+    if arguments.next_if(|first| first == EXAMINE).is_some() {
+        arguments.next();
+        words.push("verify".into());
+    }
     let mut files = Vec::new(); // after "--" no word is an option
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
@@ -53,6 +65,10 @@ mod tests {
         assert_eq!(
             line(&["meshmark", "verify", "it's\u{202e}a\\b\n.gpkg"]),
             r"meshmark verify $'it\'s\u202ea\\b\u000a.gpkg' --report report.html"
+        );
+        assert_eq!(
+            line(&["meshmark", "examine", "/tmp/folder", "--json", "examine"]),
+            "meshmark verify examine --report report.html"
         );
         assert_eq!(
             line(&["meshmark", "compare", "--report", "a.html", "--", "--json", "-b.gpkg"]),

@@ -2,24 +2,23 @@
 
 mod arguments;
 mod command_line;
+mod printing;
 mod request;
+mod verification;
 
 use crate::package_files;
-use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands, VerifyArgs};
+use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands};
 use clap::{CommandFactory, Parser};
 use meshmark_core::{counted, key::SecretKey, options::Options};
 use meshmark_verifier::{
-    Error, ExitCode, Result,
+    Error, Result,
     compare::{Comparison, compare, detail::ComparedFiles},
     distribute, html,
-    inputs::{digests::Digests, gdal_failures, private_copy::PrivateCopy, texts, versions::versions},
-    outputs::{EvidenceMapFile, Format, ReportFile},
+    inputs::{gdal_failures, texts},
+    outputs::{Format, ReportFile},
     progress::Progress,
-    report::{self, Provenance, Report},
-    verify, verify_records,
-    words::printable,
 };
-use request::request;
+use printing::{print, warn};
 use std::{
     io::{ErrorKind, Write},
     path::{Path, PathBuf},
@@ -33,7 +32,8 @@ pub fn run() -> u8 {
     gdal_failures::quieten_gdal();
     let result = match Cli::parse().command {
         Subcommands::Keygen { key_file } => keygen(&key_file).map(|()| DONE),
-        Subcommands::Verify(args) => run_verify(*args).map(|code| code as u8),
+        Subcommands::Verify(args) => verification::run(&args),
+        Subcommands::Examine { folder, args } => verification::examine(*args, &folder).map(|code| code as u8),
         Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
         Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
         Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),
@@ -42,20 +42,6 @@ pub fn run() -> u8 {
         warn(&error.to_string());
         error.exit_code() as u8
     })
-}
-
-/// Prints a warning on one line. Names in files must not control the terminal.
-fn warn(text: &str) {
-    eprintln!("meshmark: {}", printable(text));
-}
-
-/// Prints an answer. A reader may close the pipe before the end.
-fn print(text: &str) -> Result<()> {
-    let mut output = std::io::stdout().lock();
-    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::Unprinted { source: error }),
-        _ => Ok(()),
-    }
 }
 
 fn keygen(path: &PathBuf) -> Result<()> {
@@ -130,47 +116,4 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     };
     print(&format!("{} written to {}{before}\n", counted(done.written, "copy"), request.folder.display()))?;
     Ok(())
-}
-
-fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
-    let file = args.report.as_deref().map(ReportFile::new).transpose()?;
-    let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
-    let wanted = args.explain || file.is_some();
-    let references = args.reference.clone();
-    let suspect = PrivateCopy::of(&args.suspect)?;
-    let digest = || Digests::read(&args.key, &references, &suspect, args.record.as_deref());
-    let digests = wanted.then(digest).transpose()?;
-    let (json, explain, records) = (args.json, args.explain, args.records.clone());
-    let request = request(args, suspect.clone())?;
-    let mut progress = Progress::default();
-    let mut report = match &records {
-        Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,
-        None => verify(&request, &references, &mut progress)?,
-    };
-    if let Some((target, map)) = evidence_map.zip(report.evidence_map.take()) {
-        target.write(&map)?;
-    }
-    let evidence = report.evidence.take(); // only a report file holds it
-    print(&if json { report.to_json() } else { report.to_text() })?;
-    let Some(digests) = digests else { return Ok(report.exit_code()) };
-    let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
-    let inputs = digests.of_verification(&report.reference, best().as_deref())?;
-    if explain {
-        print(&format!("\n{}", report::explain(&inputs, &report)))?;
-    }
-    if let Some(file) = file {
-        let provenance = Provenance {
-            inputs,
-            reference_vertices_sha256: report.reference_digest.clone(),
-            suspect_crs: report.suspect_crs.clone(),
-            command: command_line::own(),
-            versions: versions(),
-        };
-        let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report.clone() };
-        file.write(&match file.format() {
-            Format::Html => html::verification(&report),
-            Format::Json => report.to_json(),
-        })?;
-    }
-    Ok(report.exit_code())
 }

@@ -40,6 +40,12 @@ pub(super) fn files_of(path: &Path) -> io::Result<Vec<BelongingFile>> {
     Ok(files)
 }
 
+/// Returns the size of a map with all its files; 0 for what is no local file or folder.
+pub(crate) fn size_of(path: &Path) -> u64 {
+    let size = |file: BelongingFile| file.path.metadata().map_or(0, |metadata| metadata.len());
+    files_of(path).unwrap_or_default().into_iter().map(size).sum()
+}
+
 /// Appends the other files with the same name and any extension, for a format that has such files.
 fn companions(path: &Path, files: &mut Vec<BelongingFile>) -> io::Result<()> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -48,7 +54,9 @@ fn companions(path: &Path, files: &mut Vec<BelongingFile>) -> io::Result<()> {
     }
     for entry in folder_of(path).read_dir()? {
         let file = path.with_file_name(entry?.file_name());
-        if file != path && file.is_file() && file.file_stem() == path.file_stem() {
+        // The metadata of a.shp are in a.shp.xml.
+        let belongs = [path.file_stem(), path.file_name()].contains(&file.file_stem());
+        if file != path && file.is_file() && belongs {
             let name = file.file_name().unwrap_or_default().into();
             files.push(BelongingFile { name, path: file });
         }
@@ -56,7 +64,12 @@ fn companions(path: &Path, files: &mut Vec<BelongingFile>) -> io::Result<()> {
     Ok(())
 }
 
-fn with_ending(path: &Path, ending: &str) -> PathBuf {
+/// Returns whether logs belong to a map, which then is a database.
+pub(super) fn has_logs(path: &Path) -> bool {
+    path.canonicalize().is_ok_and(|target| LOGS.iter().any(|log| with_ending(&target, log).is_file()))
+}
+
+pub(super) fn with_ending(path: &Path, ending: &str) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(ending);
     name.into()

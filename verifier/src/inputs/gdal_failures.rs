@@ -1,7 +1,20 @@
 //! GDAL's failure messages: kept, and included in the messages of this crate.
 
 use gdal::errors::GdalError;
-use std::{cell::RefCell, error, fmt, path::Path};
+use std::{
+    cell::RefCell,
+    error, fmt,
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+/// GDAL's number of failed allocations, CPLE_OutOfMemory.
+const OUT_OF_MEMORY: i32 = 2;
+
+/// What messages under other numbers say of them: that of SQLite, and that of shapelib.
+const WORDS_ABOUT_MEMORY: &[&str] = &["out of memory", "Not enough memory"];
+
+static RAN_OUT_OF_MEMORY: AtomicBool = AtomicBool::new(false);
 
 thread_local! {
     /// Keeps GDAL's last error message on this thread.
@@ -13,7 +26,10 @@ thread_local! {
 /// Keeps GDAL from printing, and keeps its messages for this crate. Call it once, before any other
 /// use of GDAL.
 pub fn quieten_gdal() {
-    gdal::config::set_error_handler(|kind, _, message| {
+    gdal::config::set_error_handler(|kind, number, message| {
+        if number == OUT_OF_MEMORY || WORDS_ABOUT_MEMORY.iter().any(|words| message.contains(words)) {
+            RAN_OUT_OF_MEMORY.store(true, Ordering::Relaxed);
+        }
         if matches!(kind, gdal::errors::CplErrType::Failure | gdal::errors::CplErrType::Fatal) {
             let named = COPY.with_borrow(|copy| {
                 let [copy, original] = copy.as_ref()?;
@@ -22,6 +38,12 @@ pub fn quieten_gdal() {
             LAST_FAILURE.set(Some(named.unwrap_or_else(|| message.to_string())));
         }
     });
+}
+
+/// Returns whether GDAL or SQLite had too little memory at any time. They go on without what they
+/// could not hold, so that no result is valid.
+pub fn ran_out_of_memory() -> bool {
+    RAN_OUT_OF_MEMORY.load(Ordering::Relaxed)
 }
 
 /// Lets GDAL's messages name the original in place of the copy while the result lives.

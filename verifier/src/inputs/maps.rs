@@ -1,6 +1,11 @@
 //! Maps: references, and maps that are marked or compared.
 
-use super::gdal_failures::{GdalFailure, forget_failure, last_failure};
+use super::{
+    belonging_files::has_logs,
+    gdal_failures::{GdalFailure, Names, forget_failure, last_failure, named_as},
+    journal,
+    private_copy::PrivateCopy,
+};
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{ground::Ground, options::Options, scale::ScaleLattice};
@@ -24,11 +29,33 @@ pub struct Reading<'a> {
 
 /// Reads the reference, which is any vector dataset that GDAL opens.
 pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
-    let dataset = open("reference", path)?;
+    let Opened { dataset, .. } = &open_untouched("reference", path)?;
     if let LabelFields::Named(names) = reading.landmarks {
-        check_fields(path, &dataset, names)?;
+        check_fields(path, dataset, names)?;
     }
-    read("reference", path, &dataset, reading)
+    read("reference", path, dataset, reading)
+}
+
+/// A dataset, and the private copy that it is opened from. They are dropped in this order.
+struct Opened {
+    dataset: Dataset,
+    _copy: Option<(Names, PrivateCopy)>,
+}
+
+/// Opens a map, or a copy where SQLite would write to the map: it merges the logs of a database.
+fn open_untouched(what: &'static str, path: &Path) -> Result<Opened> {
+    if !has_logs(path) {
+        return Ok(Opened { dataset: open(what, path)?, _copy: None });
+    }
+    let copy = PrivateCopy::of(what, path)?;
+    journal::roll_back(what, &copy)?;
+    let names = named_as(path, copy.copy());
+    let dataset = open_with(copy.copy(), None, &[]).map_err(|source| Error::Unopened {
+        what,
+        path: path.into(),
+        source,
+    })?;
+    Ok(Opened { dataset, _copy: Some((names, copy)) })
 }
 
 /// Opens a map for marking, and reads its vertices.
@@ -54,12 +81,12 @@ pub fn geometries(
     path: &Path,
     layers: Option<&[String]>,
 ) -> Result<(Vec<FeatureGeometry>, Option<CoordinateSystem>)> {
-    let dataset = open(what, path)?;
+    let Opened { dataset, .. } = &open_untouched(what, path)?;
     forget_failure();
-    let found = features(&dataset, layers, &last_failure);
+    let found = features(dataset, layers, &last_failure);
     Ok((
         found.map_err(|error| Error::Unmeasured { what, path: path.into(), source: Box::new(error) })?,
-        first_crs(&dataset),
+        first_crs(dataset),
     ))
 }
 

@@ -4,6 +4,7 @@
 mod belonging_files;
 pub mod digests;
 pub mod gdal_failures;
+mod journal;
 pub mod maps;
 pub mod private_copy;
 mod suspect_formats;
@@ -13,3 +14,5 @@ mod tables;
 pub mod texts;
 pub mod unsuitable;
 pub mod versions;
+
+pub(crate) use belonging_files::size_of;

@@ -1,8 +1,8 @@
-//! The private copy of a suspect. GDAL and SQLite write to what they read, also when they only read:
+//! The private copy of a suspect, or of a reference with logs. GDAL and SQLite write to what they read, also when they only read:
 //! a log is merged into its database and deleted, a lost index is made anew. They therefore never
 //! see the suspect itself, which stays as it was.
 
-use super::belonging_files::{BelongingFile, files_of};
+use super::belonging_files::{BelongingFile, files_of, with_ending};
 use crate::{Error, Result};
 use meshmark_dataset::workplace::Workplace;
 use std::{
@@ -14,12 +14,17 @@ use std::{
 /// Tiles are named by their folders: zoom, column, row.
 const NAMED_BY: usize = 3;
 
+/// The part of the folder that only holds the copy.
+const SUBFOLDER: &str = "suspect";
+
 /// A suspect and the copy of it that is examined.
 #[derive(Clone)]
 pub struct PrivateCopy {
     original: PathBuf,
     copy: PathBuf,
-    _workplace: Arc<Workplace>,
+    folder: PathBuf,
+    /// The owner of the folder removes it.
+    _workplace: Option<Arc<Workplace>>,
 }
 
 impl PrivateCopy {
@@ -27,21 +32,21 @@ impl PrivateCopy {
     ///
     /// # Errors
     /// Fails for what is neither a file nor a folder, and where it cannot be read or copied.
-    pub fn of(original: &Path) -> Result<Self> {
+    pub fn of(what: &'static str, original: &Path) -> Result<Self> {
         if !original.is_file() && !original.is_dir() {
             return Err(Error::NoFile { path: original.into() });
         }
         let unread = |source: io::Error| Error::Undigested { path: original.into(), source };
         let place = env::temp_dir();
         let uncopied =
-            |source: io::Error| Error::Uncopied { path: original.into(), place: place.clone(), source };
+            |source: io::Error| Error::Uncopied { what, path: original.into(), place: place.clone(), source };
         let workplace = Workplace::new(&place)?;
         let files = files_of(original).map_err(unread)?;
-        let copy = workplace
-            .subfolder("suspect")?
-            .join(last_names(&original.canonicalize().map_err(unread)?, original));
+        workplace.subfolder(SUBFOLDER)?;
+        let copied = Self::made_in(workplace.folder(), original)?;
+        let copy = &copied.copy;
         let folder = match original.is_dir() {
-            true => copy.as_path(),
+            true => copy,
             false => copy.parent().expect("a file is in a folder"),
         };
         fs::create_dir_all(folder).map_err(uncopied)?;
@@ -52,7 +57,23 @@ impl PrivateCopy {
             let mut target = fs::File::create(target).map_err(uncopied)?;
             io::copy(&mut source, &mut target).map_err(uncopied)?;
         }
-        Ok(PrivateCopy { original: original.into(), copy, _workplace: Arc::new(workplace) })
+        Ok(PrivateCopy { _workplace: Some(Arc::new(workplace)), ..copied })
+    }
+
+    /// Returns the copy that another process has made in its folder, and removes.
+    ///
+    /// # Errors
+    /// Fails when the original is no longer there.
+    pub fn made_in(folder: &Path, original: &Path) -> Result<Self> {
+        let full =
+            original.canonicalize().map_err(|source| Error::Undigested { path: original.into(), source })?;
+        let copy = folder.join(SUBFOLDER).join(last_names(&full, original));
+        Ok(PrivateCopy { original: original.into(), copy, folder: folder.into(), _workplace: None })
+    }
+
+    /// Returns the folder of the copy, to which its examination may write.
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Returns the path of the suspect, for messages.
@@ -63,6 +84,11 @@ impl PrivateCopy {
     /// Returns the path of the copy, for reading.
     pub fn copy(&self) -> &Path {
         &self.copy
+    }
+
+    /// Returns the path of the log of a database, which need not exist.
+    pub(super) fn copy_of_log(&self, ending: &str) -> PathBuf {
+        with_ending(&self.copy, ending)
     }
 
     /// Returns the path of the suspect's own file for one of the copy.

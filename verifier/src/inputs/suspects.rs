@@ -2,6 +2,7 @@
 
 use super::{
     gdal_failures::{GdalFailure, forget_failure, named_as},
+    journal,
     maps::{Reading, failed, first_crs, open_with, selection},
     private_copy::PrivateCopy,
     suspect_formats, svg, tables,
@@ -60,12 +61,14 @@ pub fn suspect(suspect: &PrivateCopy, reference: &Survey) -> Result<Suspect> {
 
 fn open_suspect(suspect: &PrivateCopy) -> Result<Dataset> {
     let (path, copy) = (suspect.original(), suspect.copy());
-    configure(copy).map_err(|source| Error::NoOption { source })?;
+    forbid_network().map_err(|source| Error::NoOption { source })?;
     check_table(suspect)?;
     suspect_formats::check(path)?;
     if svg::is_named(copy) {
         return svg::open(copy, path);
     }
+    journal::roll_back("suspect", suspect)?;
+    restore_indices(copy).map_err(|source| Error::NoOption { source })?;
     let place = highest_zoom(copy).unwrap_or_else(|| copy.into());
     let dataset = open_plain(&place, &[]).map_err(|failure| suspect_formats::unopened(path, failure))?;
     check_plain(suspect, &dataset)?;
@@ -99,24 +102,9 @@ fn numbered(folder: &Path) -> Vec<(u32, PathBuf)> {
     entries.filter_map(|entry| Some((entry.file_name()?.to_str()?.parse().ok()?, entry))).collect()
 }
 
-/// Returns whether a shapefile of the copy lacks its index. GDAL can make it anew beside the copy,
-/// but would then do so for files in archives, too, to which it cannot write.
-fn lacks_index(copy: &Path) -> bool {
-    let has =
-        |path: &Path, extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    let lacks = |path: &Path| {
-        let indices = ["shx", "SHX"].map(|extension| path.with_extension(extension));
-        has(path, "shp") && !indices.iter().any(|index| index.is_file())
-    };
-    match copy.read_dir() {
-        Ok(entries) => entries.flatten().any(|entry| lacks(&entry.path())),
-        Err(_) => lacks(copy),
-    }
-}
-
-/// Prevents network access, and chooses what GDAL may do with the copy. A suspect may name addresses, as the CRS of a GeoJSON file or as the
+/// Prevents network access. A suspect may name addresses, as the CRS of a GeoJSON file or as the
 /// schema of a GML file; a request would reveal the examination, and its answer could falsify it.
-fn configure(copy: &Path) -> gdal::errors::Result<()> {
+fn forbid_network() -> gdal::errors::Result<()> {
     for (option, value) in [
         ("GDAL_HTTP_PROXY", "127.0.0.1:0"), // no process can listen on port 0
         ("GDAL_HTTPS_PROXY", "127.0.0.1:0"),
@@ -126,27 +114,42 @@ fn configure(copy: &Path) -> gdal::errors::Result<()> {
         ("ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW", "NO"),
         ("OGR_SQLITE_LOAD_EXTENSIONS", ""),
         ("SPATIALITE_SECURITY", "strict"),
-        ("SHAPE_RESTORE_SHX", if lacks_index(copy) { "YES" } else { "NO" }), // beside the copy
     ] {
         gdal::config::set_thread_local_config_option(option, value)?;
     }
     Ok(())
 }
 
+/// Makes the lost indices of Shapefiles anew, beside the copy. GDAL would replace those that are there.
+fn restore_indices(copy: &Path) -> gdal::errors::Result<()> {
+    const RESTORE: &str = "SHAPE_RESTORE_SHX";
+    let lost = |shape: &PathBuf| !["shx", "SHX"].iter().any(|ending| shape.with_extension(ending).exists());
+    for shape in files_with_ending(copy, "shp").iter().filter(|shape| lost(shape)) {
+        gdal::config::set_thread_local_config_option(RESTORE, "YES")?;
+        drop(open_plain(shape, &[])); // the reason of a failure comes later
+        gdal::config::clear_thread_local_config_option(RESTORE)?;
+    }
+    Ok(())
+}
+
+/// Returns a file, or the files in a folder, if they have this ending.
+fn files_with_ending(path: &Path, ending: &str) -> Vec<PathBuf> {
+    let has_ending =
+        |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) && path.is_file();
+    match path.read_dir() {
+        Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| has_ending(p)).collect(),
+        Err(_) => has_ending(path).then(|| path.into()).into_iter().collect(),
+    }
+}
+
 /// Refuses MapInfo tables that refer to other tables, which may be anywhere.
 fn check_table(suspect: &PrivateCopy) -> Result<()> {
-    let path = suspect.copy();
-    let is_table = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tab"));
-    let tables: Vec<PathBuf> = match path.read_dir() {
-        Ok(entries) => entries.flatten().map(|entry| entry.path()).filter(|p| is_table(p)).collect(),
-        Err(_) => is_table(path).then(|| path.into()).into_iter().collect(),
-    };
-    for table in tables.iter().filter(|table| table.is_file()) {
-        let Ok(bytes) = std::fs::read(table) else { continue }; // GDAL reports the reason later
+    for table in files_with_ending(suspect.copy(), "tab") {
+        let Ok(bytes) = std::fs::read(&table) else { continue }; // GDAL reports the reason later
         let text = String::from_utf8_lossy(&bytes).to_lowercase();
         let seamless = text.lines().any(|line| line.contains("isseamless") && line.contains("true"));
         if seamless || text.contains("create view") {
-            return Err(Error::OtherTables { path: suspect.original_of(table) });
+            return Err(Error::OtherTables { path: suspect.original_of(&table) });
         }
     }
     Ok(())

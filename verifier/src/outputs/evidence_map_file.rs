@@ -7,6 +7,7 @@ use gdal::{
 };
 use meshmark_dataset::{CoordinateSystem, workplace::folder_of};
 use std::{
+    fs,
     io::ErrorKind,
     path::{Path, PathBuf},
 };
@@ -36,14 +37,14 @@ impl EvidenceMapFile {
         if target.path.symlink_metadata().is_ok() { Err(target.exists()) } else { Ok(target) }
     }
 
-    /// Writes the layers `vertex_displacements`, a line for every matched vertex, and `patches`.
+    /// Copies a complete map to the file.
     ///
     /// # Errors
     /// Fails when the file cannot be written, and when it exists by now.
-    pub fn write(&self, map: &EvidenceMap) -> Result<()> {
+    pub fn publish(&self, complete: &Path) -> Result<()> {
         let workplace = workplace(&self.path)?;
         let staged = workplace.path().join("map.gpkg");
-        write_layers(map, &staged).map_err(|error| self.failed(error))?;
+        fs::copy(complete, &staged).map_err(|error| self.failed(error))?;
         let staged = TempPath::try_from_path(staged).map_err(|error| self.failed(error))?;
         staged.persist_noclobber(&self.path).map_err(|error| match error.error.kind() {
             ErrorKind::AlreadyExists => self.exists(),
@@ -64,6 +65,14 @@ impl EvidenceMapFile {
 fn workplace(path: &Path) -> Result<TempDir> {
     let workplace = tempfile::Builder::new().prefix(".meshmark-evidence-map-").tempdir_in(folder_of(path));
     workplace.map_err(|error| Error::unwritten(path.display(), error))
+}
+
+/// Writes the layers `vertex_displacements`, a line for every matched vertex, and `patches`.
+///
+/// # Errors
+/// Fails when the file cannot be written.
+pub fn write_evidence_map(map: &EvidenceMap, path: &Path) -> Result<()> {
+    write_layers(map, path).map_err(|error| Error::unwritten(path.display(), error))
 }
 
 fn write_layers(map: &EvidenceMap, path: &Path) -> gdal::errors::Result<()> {

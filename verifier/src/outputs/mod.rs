@@ -3,5 +3,5 @@
 mod evidence_map_file;
 mod report_file;
 
-pub use evidence_map_file::EvidenceMapFile;
+pub use evidence_map_file::{EvidenceMapFile, write_evidence_map};
 pub use report_file::{Format, ReportFile};

@@ -31,13 +31,8 @@ impl ReportFile {
     /// Fails on another extension than html and json, on a file that exists, and on a folder that
     /// is missing or not writable.
     pub fn new(path: &Path) -> Result<Self> {
+        let format = Self::format_of(path)?;
         let refused = |reason: &str| Err(Error::ReportName { path: path.into(), reason: reason.into() });
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let format = match extension.as_deref() {
-            Some("html" | "htm") => Format::Html,
-            Some("json") => Format::Json,
-            _ => return refused("ends neither in .html nor in .json: name a file that does"),
-        };
         if path.symlink_metadata().is_ok() {
             return refused("exists, and a report is never overwritten: name another file");
         }
@@ -48,6 +43,22 @@ impl ReportFile {
         let file = ReportFile { path: path.into(), format };
         file.temporary()?; // checks that the folder is writable
         Ok(file)
+    }
+
+    /// Returns the format that the name of a file asks for.
+    ///
+    /// # Errors
+    /// Fails on another extension than html and json.
+    pub fn format_of(path: &Path) -> Result<Format> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("html" | "htm") => Ok(Format::Html),
+            Some("json") => Ok(Format::Json),
+            _ => Err(Error::ReportName {
+                path: path.into(),
+                reason: "ends neither in .html nor in .json: name a file that does".into(),
+            }),
+        }
     }
 
     /// Returns the format.

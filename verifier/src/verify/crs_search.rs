@@ -71,7 +71,7 @@ fn in_place(
     let target = reference.crs.as_ref()?;
     let mut best: Option<Registered> = None;
     for assumption in assumptions {
-        let Ok(map) = numbers.assumed(assumption, target) else { continue };
+        let Ok(map) = numbers.assumed((&assumption.crs, assumption.axes_swapped), target) else { continue };
         let registration = registrar.refine_in_place(&map.data);
         let next = Registered::new(map, Some(assumption), registration);
         let agrees = next.agrees();

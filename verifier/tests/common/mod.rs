@@ -1,9 +1,12 @@
 //! The command as the tests of suspects run it.
+#![allow(dead_code)] // each test uses a part
 
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::{Child, Command, Output},
+    thread::sleep,
+    time::Duration,
 };
 use tempfile::TempDir;
 
@@ -11,9 +14,10 @@ pub fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
 }
 
-/// What `meshmark verify` says of a suspect against the test vectors.
-pub fn verify(suspect: &Path) -> (Option<i32>, String) {
-    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_meshmark"))
+/// `meshmark verify` of a suspect against the test vectors.
+pub fn command(suspect: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));
+    command
         .env("GDAL_DRIVER_PATH", "none")
         .args(["verify", "--key"])
         .arg(fixture("vectors/key.json"))
@@ -21,16 +25,36 @@ pub fn verify(suspect: &Path) -> (Option<i32>, String) {
         .arg(fixture("vectors/record.json"))
         .arg("--reference")
         .arg(fixture("kotka.gpkg"))
-        .arg(suspect)
-        .output()
-        .unwrap();
-    (status.code(), [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat())
+        .arg(suspect);
+    command
+}
+
+/// The exit code of a command, and what it prints.
+pub fn ended(output: Output) -> (Option<i32>, String) {
+    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (output.status.code(), text.concat())
+}
+
+/// What `meshmark verify` says of a suspect against the test vectors.
+pub fn verify(suspect: &Path) -> (Option<i32>, String) {
+    ended(command(suspect).output().unwrap())
 }
 
 /// Asserts an exit code and a part of the text.
 pub fn assert_answer(suspect: &Path, code: i32, part: &str) {
     let (found, text) = verify(suspect);
     assert!(found == Some(code) && text.contains(part), "{}: {found:?}\n{text}", suspect.display());
+}
+
+/// Waits until a command runs its child, and returns the number of that process.
+pub fn child_of(parent: &Child) -> i32 {
+    let children = format!("/proc/{0}/task/{0}/children", parent.id());
+    loop {
+        match fs::read_to_string(&children).expect("the command runs").trim().parse() {
+            Ok(child) => return child,
+            Err(_) => sleep(Duration::from_millis(5)),
+        }
+    }
 }
 
 pub fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
