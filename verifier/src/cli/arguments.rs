@@ -190,7 +190,7 @@ pub(super) struct VerifyArgs {
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
-    /// Most memory of the examination, and the largest file that it writes; by default 2000 MB, 50 MB
+    /// Most memory of the examination, and the largest file that it writes; by default 1000 MB, 50 MB
     /// for each processor and 400 times the size of the maps, at most half of the machine's memory
     #[arg(long, value_name = "MB", value_parser = value_parser!(u64).range(1..))]
     pub(super) memory_limit: Option<u64>,

@@ -17,7 +17,7 @@ const BYTES_PER_SECOND: u64 = 200_000;
 /// The memory for small files, and its growth with the processors and with the size of the files. The
 /// matrices of a usual patch take 10 MB. A vertex takes two bytes of a very compact file, and less
 /// than 800 of memory.
-const LEAST_BYTES: u64 = 2_000 * MB;
+const LEAST_BYTES: u64 = 1_000 * MB;
 const BYTES_PER_PROCESSOR: u64 = 50 * MB;
 const BYTES_PER_BYTE: u64 = 400;
 
@@ -101,7 +101,7 @@ mod tests {
         let missing = folder.path().join("b");
         let by_default = Limits::new(None, None, [file.as_path(), file.as_path(), missing.as_path()]);
         let half = memory_of_machine() / 2 / MB;
-        assert_eq!(by_default, Limits { memory_mb: (2800 + 50 * processors()).min(half), time_s: 610 });
+        assert_eq!(by_default, Limits { memory_mb: (1800 + 50 * processors()).min(half), time_s: 610 });
         fs::File::options().write(true).open(&file).unwrap().set_len(1 << 40).unwrap();
         assert_eq!(Limits::new(None, None, [file.as_path()]).memory_mb, half);
     }
