@@ -117,6 +117,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         record: None,
         subject: None,
         sought: Sought::Message { bits: 128 },
+        tried: 1,
         parameters: Parameters { precision_crs_units: Some(PRECISION_M), ..Parameters::default() },
         layers: None,
         srs: None,

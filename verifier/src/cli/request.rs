@@ -2,7 +2,7 @@
 
 use super::arguments::VerifyArgs;
 use meshmark_core::{
-    key::RECIPIENT_BITS,
+    key::{RECIPIENT_BITS, SecretKey},
     options::{Options, Spelling, Subject},
     recorded::Recorded,
 };
@@ -13,50 +13,79 @@ use meshmark_verifier::{
     verify::{Sought, check_key},
 };
 
-/// Combines key, record and flags.
-pub(super) fn request(args: VerifyArgs, suspect: PrivateCopy) -> Result<Request> {
+/// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
+/// either.
+pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<Request>> {
     let key = texts::key(&args.key)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
-    let options = Options::parse(flags)?;
-    let options = match &record {
+    let possible = match &record {
         Some(record) => {
+            Options::parse(flags)?;
             check_flags(&args.marking.0, record)?;
             check_key(record, &key)?;
-            record.options()?
+            vec![record.options()?]
         }
-        None => options,
+        None => possible_options(flags.collect(), args.demodulator.into())?,
     };
-    let demodulator = args.demodulator.into();
-    let sought = match options.coefficients {
+    let tried = possible.len();
+    let request = |options: Options| {
+        Ok(Request {
+            sought: sought(&options, &key, args.demodulator.into(), tried)?,
+            tried,
+            subject: options.subject,
+            key: key.clone(),
+            reference: args.reference.first().expect("one is required").clone(),
+            suspect: suspect.clone(),
+            record: record.clone(),
+            parameters: options.parameters,
+            layers: options.layers,
+            srs: options.srs,
+            landmarks: args.landmark.clone(),
+            registration: args.registration.into(),
+            demodulator: args.demodulator.into(),
+            radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
+            significance: args.significance,
+            sketch: args.report.is_some(),
+            evidence_map: args.evidence_map.is_some(),
+        })
+    };
+    possible.into_iter().map(request).collect()
+}
+
+/// Returns the options of the marks that flags may mean: CODE, CHIP_RATE, MESSAGE and the demodulator
+/// of the paper mean a message, and all others either a fingerprint or a message.
+fn possible_options(flags: Vec<(&str, &str)>, demodulator: Demodulator) -> Result<Vec<Options>> {
+    let given = Options::parse(flags.iter().copied())?;
+    let is_of_message = flags.iter().any(|(name, _)| ["CODE", "CHIP_RATE", "MESSAGE"].contains(name));
+    if is_of_message {
+        return Ok(vec![given]);
+    }
+    let code = given.parameters.code.name();
+    let message = Options::parse(flags.iter().copied().chain([("CODE", code.as_str())]))?;
+    if demodulator == Demodulator::Paper {
+        return Ok(vec![message]);
+    }
+    let fingerprint = match given.coefficients {
+        Some(_) => given,
+        None => Options::parse_for_recipients(flags)?,
+    };
+    Ok(vec![fingerprint, message])
+}
+
+/// Returns what the mark of these options carries.
+fn sought(options: &Options, key: &SecretKey, demodulator: Demodulator, tried: usize) -> Result<Sought> {
+    Ok(match options.coefficients {
         Some(_) if demodulator == Demodulator::Paper => return Err(Error::PaperOfFingerprint),
         Some(coefficients) => {
             let recipient = options.subject.as_ref().and_then(Subject::recipient);
             let recipients = recipient.map(String::from).into_iter().collect();
-            Sought::Fingerprint { coefficients, recipients, tried: 1 }
+            Sought::Fingerprint { coefficients, recipients, tried }
         }
         None => {
-            let bits = options.subject.as_ref().map(|subject| subject.message(&key).len());
+            let bits = options.subject.as_ref().map(|subject| subject.message(key).len());
             Sought::Message { bits: bits.unwrap_or(RECIPIENT_BITS) }
         }
-    };
-    Ok(Request {
-        sought,
-        subject: options.subject,
-        key,
-        reference: args.reference.into_iter().next().expect("one is required"),
-        suspect,
-        record,
-        parameters: options.parameters,
-        layers: options.layers,
-        srs: options.srs,
-        landmarks: args.landmark,
-        registration: args.registration.into(),
-        demodulator,
-        radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
-        significance: args.significance,
-        sketch: args.report.is_some(),
-        evidence_map: args.evidence_map.is_some(),
     })
 }
 

@@ -4,7 +4,7 @@ use super::{
     arguments::VerifyArgs,
     command_line,
     printing::{WARNING, print, warn},
-    request::request,
+    request::requests,
 };
 use meshmark_verifier::{
     Error, ExitCode, Result,
@@ -106,11 +106,11 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     let digest = || Digests::read(&args.key, &references, &suspect, args.record.as_deref());
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
-    let request = request(args, suspect.clone())?;
+    let requests = requests(&args, &suspect)?;
     let mut progress = Progress::of_child();
     let mut report = match &records {
-        Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,
-        None => verify(&request, &references, &mut progress)?,
+        Some(folder) => verify_records(&requests[0], &references, folder, &mut progress, &mut warn)?,
+        None => verify(&requests, &references, &mut progress)?,
     };
     if let Some(map) = report.evidence_map.take() {
         write_evidence_map(&map, &Handover(folder).evidence_map())?;

@@ -23,20 +23,56 @@ pub use examination::{Examination, Suited, examine, read_reference};
 pub use records::verify_records;
 pub use request::{Request, Sought};
 
-use crate::{Result, progress::Progress, report::Report};
+use crate::{Error, Result, progress::Progress, report::Report};
 use conclusion::{conclude, conclude_fingerprint};
 use meshmark_core::options::Subject;
-use meshmark_detection::decision::{Decision, Expected};
+use meshmark_detection::decision::{Decision, Expected, Verdict};
 use references::read_own_reference;
 use std::path::PathBuf;
 
 /// Verifies one suspect against the only reference, or against that of several from which the record
-/// of the request was made.
+/// of the request was made. Of several requests, for marks that the suspect may have, the report is
+/// that of the best one; requests that do not fit the reference do not count.
 ///
 /// # Errors
 /// Fails on unreadable input, on parameters that do not fit the reference, and on a record of
 /// another reference.
-pub fn verify(request: &Request, references: &[PathBuf], progress: &mut Progress) -> Result<Report> {
+pub fn verify(requests: &[Request], references: &[PathBuf], progress: &mut Progress) -> Result<Report> {
+    let mut best: Option<Report> = None;
+    let mut unfit = None;
+    for request in requests {
+        match verify_mark(request, references, progress) {
+            Err(error) if requests.len() > 1 && is_unfit(&error) => unfit = unfit.or(Some(error)),
+            Err(error) => return Err(error),
+            Ok(report) => {
+                best = Some(match best {
+                    Some(best) => better(best, report),
+                    None => report,
+                });
+            }
+        }
+    }
+    best.ok_or_else(|| unfit.expect("there is a request"))
+}
+
+fn is_unfit(error: &Error) -> bool {
+    matches!(error, Error::Unfit { .. }) || error.is_about_options()
+}
+
+/// Returns the better of two reports on the same suspect: a match before a mark of the key without a
+/// match, and this before others. Of these an inconclusive one is the answer, as it cannot rule out
+/// its mark.
+fn better(first: Report, second: Report) -> Report {
+    let rank = |report: &Report| match report.verdict {
+        Verdict::Match => 3,
+        _ if report.shows_key() => 2,
+        Verdict::Inconclusive => 1,
+        Verdict::NoMatch => 0,
+    };
+    if rank(&second) > rank(&first) { second } else { first }
+}
+
+fn verify_mark(request: &Request, references: &[PathBuf], progress: &mut Progress) -> Result<Report> {
     let (request, reference) = read_own_reference(request, references, progress)?;
     let seen = examine(&request, &reference, progress)?.or_fail()?;
     if matches!(request.sought, Sought::Fingerprint { .. }) {
@@ -53,7 +89,7 @@ fn decide_subjects(request: &Request, seen: &Examination) -> (Option<Subject>, D
         return (request.subject.clone(), Decision::inconclusive(reason.clone()));
     }
     let subjects = request.subjects();
-    let tried = subjects.len();
+    let tried = subjects.len() + request.tried - 1;
     let decide = |subject: Subject| {
         let expected = Expected::new(&subject, &request.key);
         (Some(subject), seen.decide(&expected, tried, request.significance))

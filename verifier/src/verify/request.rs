@@ -59,6 +59,8 @@ pub struct Request {
     pub subject: Option<Subject>,
     /// What the mark carries.
     pub sought: Sought,
+    /// Number of the marks that are tried, this one included, as nobody recorded which it is.
+    pub tried: usize,
     /// The parameters of the mark.
     pub parameters: Parameters,
     /// Layers that were marked; all when `None`.
