@@ -29,6 +29,7 @@ pub mod read_back;
 mod selection;
 mod survey;
 mod threads;
+pub mod traces;
 mod turns;
 pub mod wkb;
 pub mod workplace;

@@ -26,6 +26,7 @@ use meshmark_dataset::{
     decimals::Digits,
     marking::{self, Moves, Unmarked},
     same_file, survey,
+    traces::{self, ForeignMembers},
 };
 use std::{fs::File, path::Path};
 
@@ -178,6 +179,19 @@ impl Marking {
             files: source.files,
             warnings,
         })
+    }
+
+    /// Adds warnings about the traces in the source.
+    pub fn search_traces(
+        &mut self,
+        request: &MarkingRequest,
+        source: &Dataset,
+        foreign: &ForeignMembers,
+        last_failure: &dyn Fn() -> Option<String>,
+    ) -> Result<()> {
+        let found = traces::search(source, &self.map, &request.options, foreign, last_failure)?;
+        self.warnings.extend(traces::warnings(&found, &request.options, Spelling::OpenOption)?);
+        Ok(())
     }
 
     /// Writes the record to the path of the request.
