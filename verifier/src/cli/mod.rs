@@ -59,9 +59,7 @@ fn print(text: &str) -> Result<()> {
 }
 
 fn keygen(path: &PathBuf) -> Result<()> {
-    let mut secret = zeroize::Zeroizing::new([0; 32]);
-    getrandom::fill(secret.as_mut_slice()).map_err(|source| Error::Random { source })?;
-    let key = SecretKey::from_bytes(*secret);
+    let key = SecretKey::filled(getrandom::fill).map_err(|source| Error::Random { source })?;
     let failed = |error: std::io::Error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Exists {
             path: path.clone(),
