@@ -6,7 +6,10 @@ use crate::{Error, Result, error::KeyFault, hex, message::Message, part::PartDig
 use hmac::{Hmac, KeyInit, Mac};
 use serde::{Deserialize, Serialize};
 use sha2::Sha256;
-use std::io::{self, Read};
+use std::{
+    io::{self, Read},
+    sync::Arc,
+};
 use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
 
 const VERSION: u32 = 1;
@@ -42,9 +45,9 @@ enum MarkVersion {
 }
 
 /// A 256-bit secret. `Debug` does not show it, and it is wiped from memory when dropped. It stays in
-/// one place: whatever holds it moves without leaving copies behind.
+/// one place: whatever holds it moves without leaving copies behind, and clones share it.
 #[derive(Clone)]
-pub struct SecretKey(Box<Zeroizing<[u8; SECRET_BYTES]>>);
+pub struct SecretKey(Arc<Zeroizing<[u8; SECRET_BYTES]>>);
 
 const SECRET_BYTES: usize = 32;
 
@@ -68,14 +71,14 @@ impl SecretKey {
     pub fn filled<E>(
         fill: impl FnOnce(&mut [u8]) -> std::result::Result<(), E>,
     ) -> std::result::Result<Self, E> {
-        let mut secret = Box::new(Zeroizing::new([0; SECRET_BYTES]));
-        fill(secret.as_mut_slice())?;
+        let mut secret = Arc::new(Zeroizing::new([0; SECRET_BYTES]));
+        fill(Arc::get_mut(&mut secret).expect("nobody shares it yet").as_mut_slice())?;
         Ok(SecretKey(secret))
     }
 
     /// Creates the key with these 32 bytes, for trials and tests: the caller has a copy.
     pub fn from_bytes(secret: [u8; SECRET_BYTES]) -> Self {
-        SecretKey(Box::new(Zeroizing::new(secret)))
+        SecretKey(Arc::new(Zeroizing::new(secret)))
     }
 
     /// Reads a key file's text.

@@ -84,4 +84,4 @@ mod whitening;
 mod words;
 
 pub use error::{Error, Result};
-pub use words::counted;
+pub use words::{counted, visible};

@@ -22,7 +22,7 @@ fn byte(at: usize) -> u8 {
 
 /// Returns a digit of the secret.
 fn digit(at: usize) -> u8 {
-    let nibble = if at % 2 == 0 { byte(at / 2) >> 4 } else { byte(at / 2) & 15 };
+    let nibble = if at.is_multiple_of(2) { byte(at / 2) >> 4 } else { byte(at / 2) & 15 };
     b"0123456789abcdef"[usize::from(nibble)]
 }
 
@@ -78,7 +78,7 @@ fn used(path: &Path) {
     let request = moved(moved(Request { _more: [7; 9], key }));
     let subject = Subject::Recipient("ACME".into());
     let _ = (Carrier::new(&request.key), subject.message(&request.key), request.key.commitment());
-    let boxed = Box::new(moved(request));
+    let boxed = Box::new((request.key.clone(), moved(request)));
     assert_eq!(copies(), [1, 0], "while the key is used");
     drop(boxed);
 }
