@@ -269,7 +269,7 @@ fn foreign_members_that_hold_places_are_warned_of_on_all_three_ways() {
         for said in said {
             assert_eq!(said.matches(warned).count(), times, "{source}: {said}");
         }
-        ["ref.gpkg", "record.json"].map(|name| fs::remove_file(host.path(name)).unwrap());
+        ["ref.gpkg", "record.json"].iter().for_each(|name| fs::remove_file(host.path(name)).unwrap());
     }
 }
 
