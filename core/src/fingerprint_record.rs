@@ -164,6 +164,7 @@ impl FingerprintRecord {
             parameters: self.mark.parameters(),
             coefficients: Some(self.mark.coefficients),
             layers: self.layers.clone(),
+            refuses_traces: false,
             srs: self.srs.clone(),
             record_path: None,
         }

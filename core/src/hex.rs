@@ -1,9 +1,12 @@
 //! Bytes as hexadecimal digits.
 
-/// Encodes each byte as two lower-case digits.
+/// Encodes each byte as two lower-case digits. The text does not grow, as it would then leave copies
+/// of a secret behind.
 pub fn encode(bytes: &[u8]) -> String {
     let digit = |nibble: u8| char::from_digit(nibble.into(), 16).expect("four bits are a digit");
-    bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
+    let mut text = String::with_capacity(2 * bytes.len());
+    text.extend(bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]));
+    text
 }
 
 /// Decodes `text`, in either case, into `bytes` and makes no other copy; returns `None` unless the

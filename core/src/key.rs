@@ -6,7 +6,10 @@ use crate::{Error, Result, error::KeyFault, hex, message::Message, part::PartDig
 use hmac::{Hmac, KeyInit, Mac};
 use serde::{Deserialize, Serialize};
 use sha2::Sha256;
-use std::io::{self, Read};
+use std::{
+    io::{self, Read},
+    sync::Arc,
+};
 use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
 
 const VERSION: u32 = 1;
@@ -41,9 +44,12 @@ enum MarkVersion {
     Two,
 }
 
-/// A 256-bit secret. `Debug` does not show it, and it is wiped from memory when dropped.
-#[derive(Clone, Zeroize, ZeroizeOnDrop)]
-pub struct SecretKey([u8; 32]);
+/// A 256-bit secret. `Debug` does not show it, and it is wiped from memory when dropped. It stays in
+/// one place: whatever holds it moves without leaving copies behind, and clones share it.
+#[derive(Clone)]
+pub struct SecretKey(Arc<Zeroizing<[u8; SECRET_BYTES]>>);
+
+const SECRET_BYTES: usize = 32;
 
 /// The key file (JSON).
 #[derive(Serialize, Deserialize, ZeroizeOnDrop)]
@@ -57,10 +63,22 @@ struct KeyFile {
 }
 
 impl SecretKey {
-    /// Creates the key with these 32 secret bytes, which must come from the operating system's
-    /// generator.
-    pub fn from_bytes(secret: [u8; 32]) -> Self {
-        SecretKey(secret)
+    /// Creates the key with the secret that `fill` writes, which must come from the operating
+    /// system's generator.
+    ///
+    /// # Errors
+    /// Returns the error of `fill`.
+    pub fn filled<E>(
+        fill: impl FnOnce(&mut [u8]) -> std::result::Result<(), E>,
+    ) -> std::result::Result<Self, E> {
+        let mut secret = Arc::new(Zeroizing::new([0; SECRET_BYTES]));
+        fill(Arc::get_mut(&mut secret).expect("nobody shares it yet").as_mut_slice())?;
+        Ok(SecretKey(secret))
+    }
+
+    /// Creates the key with these 32 bytes, for trials and tests: the caller has a copy.
+    pub fn from_bytes(secret: [u8; SECRET_BYTES]) -> Self {
+        SecretKey(Arc::new(Zeroizing::new(secret)))
     }
 
     /// Reads a key file's text.
@@ -75,9 +93,9 @@ impl SecretKey {
             let found = file.meshmark_key;
             return Err(Error::Key(KeyFault::Version { found, expected: VERSION }));
         }
-        let mut secret = Zeroizing::new([0; 32]);
-        hex::decode_into(&file.secret, secret.as_mut_slice()).ok_or(Error::Key(KeyFault::Secret))?;
-        let key = SecretKey(*secret);
+        let decoded =
+            |secret: &mut [u8]| hex::decode_into(&file.secret, secret).ok_or(Error::Key(KeyFault::Secret));
+        let key = SecretKey::filled(decoded)?;
         if key.id() != file.id {
             return Err(Error::Key(KeyFault::Id));
         }
@@ -86,8 +104,11 @@ impl SecretKey {
 
     /// Returns the text of a key file.
     pub fn to_json(&self) -> Zeroizing<String> {
-        let file = KeyFile { meshmark_key: VERSION, id: self.id(), secret: hex::encode(&self.0) };
-        Zeroizing::new(serde_json::to_string_pretty(&file).expect("strings are JSON") + "\n")
+        let file = KeyFile { meshmark_key: VERSION, id: self.id(), secret: hex::encode(self.0.as_slice()) };
+        let mut text = Zeroizing::new(Vec::with_capacity(USUAL_TEXT));
+        serde_json::to_writer_pretty(&mut *text, &file).expect("strings are JSON");
+        text.push(b'\n');
+        Zeroizing::new(String::from_utf8(std::mem::take(&mut *text)).expect("JSON is UTF-8"))
     }
 
     /// Returns the public name of the key: 64 bits of a keyed hash, in hexadecimal.
@@ -143,7 +164,15 @@ impl SecretKey {
     /// Returns the HMAC-SHA-256 (FIPS 198-1) of a version of the mark, a purpose and a text, so
     /// that one use of the key reveals nothing about another.
     fn derive_for(&self, version: MarkVersion, purpose: &str, text: &[u8]) -> [u8; 32] {
-        let mut mac = Hmac::<Sha256>::new_from_slice(&self.0).expect("HMAC takes any key length");
+        let hash = self.keyed_hash(version, purpose, text);
+        wipe_stack();
+        hash
+    }
+
+    /// Leaves copies of the secret on the stack.
+    #[inline(never)]
+    fn keyed_hash(&self, version: MarkVersion, purpose: &str, text: &[u8]) -> [u8; 32] {
+        let mut mac = Hmac::<Sha256>::new_from_slice(self.0.as_slice()).expect("HMAC takes any key length");
         mac.update(match version {
             MarkVersion::One => b"meshmark v1 ",
             MarkVersion::Two => b"meshmark v2 ",
@@ -154,6 +183,17 @@ impl SecretKey {
         mac.finalize().into_bytes().into()
     }
 }
+
+/// Overwrites the stack below the caller, on which the functions that it called left their variables.
+#[inline(never)]
+fn wipe_stack() {
+    let mut below = [0_u8; DEEPEST_BYTES];
+    below.zeroize();
+    std::hint::black_box(&below);
+}
+
+/// More stack than a keyed hash uses.
+const DEEPEST_BYTES: usize = 8192;
 
 impl std::fmt::Debug for SecretKey {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -85,4 +85,4 @@ mod whitening;
 mod words;
 
 pub use error::{Error, Result};
-pub use words::counted;
+pub use words::{counted, visible};

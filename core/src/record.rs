@@ -150,6 +150,7 @@ impl Record {
             parameters: self.parameters.clone(),
             coefficients: None,
             layers: self.layers.clone(),
+            refuses_traces: false,
             srs: self.srs.clone(),
             record_path: None,
         };

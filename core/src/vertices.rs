@@ -1,7 +1,6 @@
 //! The vertices of a map in canonical order: the one numbering that embedding and detection share.
 
 use crate::{Error, Result, hex};
-use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 /// Distinct vertices, sorted by x and then y, so that nothing depends on the order of features in
@@ -34,7 +33,9 @@ impl VertexTable {
             return Err(Error::NotFinite { index, x, y });
         }
         let mut sorted: Vec<([f64; 2], u32)> = coords.into_iter().map(canonical).zip(0..).collect();
-        sorted.par_sort_unstable_by(|a, b| order(&a.0, &b.0));
+        // Hosts may fork between two jobs, and a map is read outside the job's own threads: a parallel
+        // sort would start rayon's, which never end and which a child process lacks.
+        sorted.sort_unstable_by(|a, b| order(&a.0, &b.0));
         let mut indices = vec![0; sorted.len()];
         let mut coords: Vec<[f64; 2]> = Vec::new();
         for (point, place) in sorted {

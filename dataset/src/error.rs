@@ -25,6 +25,7 @@ pub enum Error {
     FewPlaces { layer: String, crs: String },
     TooLarge { most: usize },
     TooSmall { size_m: f64, tolerance_m: f64 },
+    Traces(Vec<String>),
     UnevenScale { ends: [[f64; 2]; 2], off_percent: f64, crs: String },
     UnknownFormat { named: Option<String>, extension: Option<String>, known: String },
     OneLayer { driver: &'static str },
@@ -177,6 +178,13 @@ impl Error {
                  the rest",
                 shortest[0], shortest[1], longest[0], longest[1]
             ),
+            Error::Traces(traces) => {
+                format!(
+                    "{}, and {} marks no such map",
+                    traces.join("; "),
+                    spelling.value("ATTRIBUTES", "REFUSE")
+                )
+            }
             Error::UnknownFormat { named, extension, known } => {
                 let what = match (named, extension) {
                     (Some(name), _) => spelling.value("FORMAT", name),

@@ -3,12 +3,7 @@
 use crate::{
     CoordinateSystem, Error, Geometries, Result, Survey,
     quality::{BeforeAfter, Outlines, Quality, State},
-    turns::turn,
     wkb,
-};
-use gdal::{
-    Dataset,
-    vector::{Geometry, Layer, LayerAccess, OGRFieldType},
 };
 use meshmark_core::{
     embedding::Marked,
@@ -70,10 +65,6 @@ const SOFTWARE: &str = concat!("meshmark ", env!("CARGO_PKG_VERSION"));
 
 /// A map smaller than this many tolerances would be noise after its marking.
 const LEAST_TOLERANCES: f64 = 10.0;
-
-/// Number of features per layer in which coordinates as text are searched: some features may have
-/// none.
-const FEATURES_TO_LOOK_AT: usize = 100;
 
 /// Fails for a map so small that its units must be wrong.
 ///
@@ -146,51 +137,10 @@ pub fn warnings(
     warnings
 }
 
-/// With this option CSV files keep no column of coordinates as text among the attributes.
-const NO_TEXT_OF_GEOMETRY: &str = "@KEEP_GEOM_COLUMNS=NO";
-
 /// The open options for any map. CSV files hold their coordinates as text, which would otherwise
 /// stay an attribute, and unmarked; layers of OpenStreetMap files must be read one at a time,
 /// whatever the configuration. With @ an option concerns only drivers that have it.
-pub const OPEN_OPTIONS: [&str; 2] = [NO_TEXT_OF_GEOMETRY, "@INTERLEAVED_READING=NO"];
-
-/// Returns a warning for a dataset with coordinates as text among its attributes, where they stay
-/// unmarked. A dataset from a CSV file may have them.
-pub fn coordinates_as_text(dataset: &Dataset) -> Option<String> {
-    let find = |mut layer: Layer| {
-        let _turn = turn(dataset, &layer.name()).ok()?;
-        Some((layer.name(), attribute_of_wkt(&mut layer)?))
-    };
-    let (layer, attribute) = dataset.layers().find_map(find)?;
-    Some(format!(
-        "layer \"{layer}\" has coordinates as text in its attribute \"{attribute}\", which stays as it is: with it \
-         anybody can undo the mark; leave it out, for example with -select, or open a CSV file with {}",
-        NO_TEXT_OF_GEOMETRY.trim_start_matches('@')
-    ))
-}
-
-/// Returns the warning about a layer of a GeoJSON file whose features have foreign members that
-/// hold places.
-pub fn foreign_places(layer: &str) -> String {
-    format!(
-        "layer \"{layer}\" has geometries or bounding boxes in foreign members of its features, which stay as they are: with \
-         them anybody can undo the mark; leave them out, for example by a conversion with -noNativeData"
-    )
-}
-
-/// Returns the first attribute that holds a geometry as text in one of the first features, whatever
-/// its name.
-fn attribute_of_wkt(layer: &mut Layer) -> Option<String> {
-    let fields: Vec<_> = layer.defn().fields().map(|field| (field.name(), field.field_type())).collect();
-    let is_wkt = |text: String| Geometry::from_wkt(&text).is_ok();
-    let found = layer.features().take(FEATURES_TO_LOOK_AT).find_map(|feature| {
-        let mut texts = fields.iter().enumerate().filter(|(_, (_, kind))| *kind == OGRFieldType::OFTString);
-        let holds_wkt = |index| feature.field_as_string(index).is_ok_and(|text| text.is_some_and(is_wkt));
-        texts.find(|(index, _)| holds_wkt(*index)).map(|(_, (name, _))| name.clone())
-    });
-    layer.reset_feature_reading();
-    found
-}
+pub const OPEN_OPTIONS: [&str; 2] = ["@KEEP_GEOM_COLUMNS=NO", "@INTERLEAVED_READING=NO"];
 
 /// Returns the record's description of the reference map.
 pub fn reference(map: &Survey, patches: usize) -> Reference {

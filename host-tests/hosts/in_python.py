@@ -3,6 +3,7 @@
 A failure must leave no file.
 """
 
+import multiprocessing
 import os
 
 import folder
@@ -102,7 +103,27 @@ def an_older_copy_is_no_success():
     assert copy_for("B", replace), "a copy that replaces the older one fails the check"
 
 
+def marked_by_reading(recipient):
+    """Returns the geometries of the map, marked for a recipient."""
+    dataset = gdal.OpenEx("MESHMARK:map.gpkg", open_options=["KEY=key.json", f"RECIPIENT={recipient}"])
+    layers = (dataset.GetLayer(number) for number in range(dataset.GetLayerCount()))
+    return [feature.GetGeometryRef().ExportToWkb() for layer in layers for feature in layer]
+
+
+def children_mark_like_their_parent():
+    """A child of a fork has none of its parent's threads, and must not wait for them."""
+    of_parent = [marked_by_reading(recipient) for recipient in "AB"]
+    with multiprocessing.get_context("fork").Pool(2) as children:
+        of_children = children.map_async(marked_by_reading, "AB").get(timeout=600)
+    assert of_children == of_parent, "a child marks differently"
+    children = multiprocessing.get_context("fork").Pool(1)
+    assert children.apply_async(copy_for, ["child"]).get(timeout=600), "a copy of a child fails the check"
+    os.remove("copy.gpkg")
+    print("passed: python: children of a fork mark like their parent", flush=True)
+
+
 write_all_layers()
+children_mark_like_their_parent()
 assert copy_for("A"), "a copy in a free place fails the check"
 an_older_copy_is_no_success()
 with folder.unchanged("python: a wrong key file, reading"):

@@ -3,7 +3,8 @@
 use crate::{built, product::marking_arguments};
 use meshmark_core::key::SecretKey;
 use std::{
-    fs,
+    fs::{self, Permissions},
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -45,6 +46,7 @@ impl Host {
         let host = Host { work: tempfile::tempdir().unwrap(), plugins: tempfile::tempdir().unwrap() };
         std::os::unix::fs::symlink(library(), host.plugins.path().join("ogr_MESHMARK.so")).unwrap();
         fs::write(host.path("key.json"), host.key().to_json().as_bytes()).unwrap();
+        fs::set_permissions(host.path("key.json"), Permissions::from_mode(0o600)).unwrap();
         host
     }
 

@@ -126,12 +126,8 @@ OGRErr MeshmarkLayer::SetNextByIndex(GIntBig index)
 
 bool MeshmarkLayer::Mark(OGRFeature &feature)
 {
-    if (feature.GetNativeData() && meshmark_clear_native_data(OGRFeature::ToHandle(&feature)) && m_marked &&
-        !m_warnedOfPlaces)
-    {
-        m_warnedOfPlaces = true;
-        meshmark_warn_of_foreign_places(GetName());
-    }
+    if (feature.GetNativeData())
+        meshmark_clear_native_data(OGRFeature::ToHandle(&feature));
     for (int field = 0; m_marked && field < feature.GetGeomFieldCount(); field++)
     {
         if (!MarkGeometry(feature, field))

@@ -63,8 +63,7 @@ extern "C"
 
     // Removes places from the native data of a feature; returns whether its foreign members hold
     // some (src/ffi_native_data.rs).
-    bool meshmark_clear_native_data(OGRFeatureH);
-    void meshmark_warn_of_foreign_places(const char *layer);
+    void meshmark_clear_native_data(OGRFeatureH);
     // The native data of a layer, without places; the caller frees it.
     char **meshmark_native_data(CSLConstList metadata);
 
@@ -181,7 +180,6 @@ class MeshmarkLayer final : public OGRLayer
     const MeshmarkMarking *const m_marking;
     const bool m_marked;
     CPLStringList m_nativeData;       // words of a GeoJSON file, without places
-    bool m_warnedOfPlaces = false;    // that foreign members hold some
     bool m_evaluatesGeometry = false; // the attribute filter does
     bool m_readsAll = false;          // whatever the filters
     bool m_ended = false;

@@ -4,6 +4,7 @@
 use crate::{
     error::{Error, Result},
     ffi_errors::{Collector, guarded, report, silence_panics},
+    ffi_native_data::foreign_members,
     ffi_source::{Borrowed, OwnedSource},
     ffi_text::{strings, text},
     marking::{Marking, MarkingRequest, Source, split_options},
@@ -11,11 +12,7 @@ use crate::{
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
-use meshmark_dataset::{
-    marked_view::PREFIX,
-    marking::{NotMoved, coordinates_as_text},
-    threads,
-};
+use meshmark_dataset::{marked_view::PREFIX, marking::NotMoved, threads, traces::ForeignMembers};
 use std::{
     ffi::{CString, c_char},
     path::Path,
@@ -80,7 +77,7 @@ unsafe extern "C" fn meshmark_open(
         let (name, options, source) = unsafe { (text(name), strings(options), &mut *source) };
         let opened = request(&options).and_then(|request| {
             let opened = OwnedSource::open(&name, asks_for_native_data(&options))?;
-            let marking = mark(name.clone(), &request, &opened.dataset())?;
+            let marking = mark(name.clone(), &request, &opened.dataset(), None)?;
             marking.write_record(&request)?;
             *source = opened.into_handle();
             Ok(marking)
@@ -102,7 +99,7 @@ unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) ->
         let (source, options) = unsafe { (Borrowed::new(source), strings(options)) };
         let name = source.name();
         let marking = request(&options).and_then(|request| {
-            let marking = mark(name.clone(), &request, &source)?;
+            let marking = mark(name.clone(), &request, &source, None)?;
             marking.write_record(&request)?;
             Ok(marking)
         });
@@ -221,8 +218,13 @@ fn request(options: &[String]) -> Result<MarkingRequest> {
 }
 
 /// Marks the dataset and suppresses the messages of GDAL meanwhile: streaming emits those that
-/// matter again.
-pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result<Marking> {
+/// matter again. The native data of features are in the attribute `native_column` of a staged map.
+pub fn mark(
+    name: String,
+    request: &MarkingRequest,
+    source: &Borrowed,
+    native_column: Option<&str>,
+) -> Result<Marking> {
     if source.is_meshmark() {
         return Err(Error::Marked("a marked view"));
     }
@@ -234,8 +236,8 @@ pub fn mark(name: String, request: &MarkingRequest, source: &Borrowed) -> Result
     let surveyed = Source { name, dataset: source, files, last_failure: &last_failure };
     let mut marking = Marking::new(request, surveyed, threads())?;
     drop(geometry_only);
-    // This follows the survey, which reports unreadable input.
-    marking.warnings.extend(coordinates_as_text(source));
+    let foreign = ForeignMembers { of: &foreign_members, column: native_column };
+    marking.search_traces(request, source, &foreign, &last_failure)?;
     Ok(marking)
 }
 

@@ -2,15 +2,12 @@
 //! without unmarked positions.
 
 use crate::{
-    ffi_errors::{guarded, report},
+    ffi_errors::guarded,
     ffi_features::{Feature, FeatureRef},
     ffi_text::{c_string, strings, text},
 };
-use gdal_sys::{CPLErr, OGRFeatureH};
-use meshmark_dataset::{
-    geojson_text::{MEDIA_TYPE, has_foreign_places, without_places},
-    marking::foreign_places,
-};
+use gdal_sys::OGRFeatureH;
+use meshmark_dataset::geojson_text::{MEDIA_TYPE, without_places};
 use std::{
     ffi::{CStr, CString, c_char},
     ptr,
@@ -30,11 +27,10 @@ pub fn item_without_places(name: &str, value: &str) -> Option<String> {
 }
 
 impl FeatureRef<'_> {
-    /// Returns its native data without places, and whether its foreign members hold some; `None`
-    /// when nothing is left.
-    pub fn native_data(&self) -> Option<(CString, bool)> {
+    /// Returns its native data without places; `None` when nothing is left.
+    pub fn native_data(&self) -> Option<CString> {
         // SAFETY: the feature is there; both texts are null or C strings, and are copied.
-        let (data, foreign) = unsafe {
+        let data = unsafe {
             let (data, kind) = (
                 gdal_sys::OGR_F_GetNativeData(self.handle()),
                 gdal_sys::OGR_F_GetNativeMediaType(self.handle()),
@@ -42,11 +38,17 @@ impl FeatureRef<'_> {
             if data.is_null() || !text(kind).eq_ignore_ascii_case(MEDIA_TYPE) {
                 return None;
             }
-            let text = CStr::from_ptr(data).to_bytes();
-            (without_places(text)?, has_foreign_places(text))
+            without_places(CStr::from_ptr(data).to_bytes())?
         };
-        Some((CString::new(data).expect("it was a C string"), foreign))
+        Some(CString::new(data).expect("it was a C string"))
     }
+}
+
+/// Returns the foreign members of a feature that GDAL read from GeoJSON.
+pub fn foreign_members(feature: &gdal::vector::Feature) -> Option<String> {
+    // SAFETY: the feature outlives the call.
+    let data = unsafe { FeatureRef::new(feature.c_feature()) }.native_data();
+    data.map(|data| data.to_string_lossy().into_owned())
 }
 
 impl Feature {
@@ -60,25 +62,16 @@ impl Feature {
     }
 }
 
-/// Removes places from the native data of a feature that is handed on; returns whether its foreign
-/// members hold some.
+/// Removes places from the native data of a feature that is handed on.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) -> bool {
-    guarded(false, || {
+unsafe extern "C" fn meshmark_clear_native_data(feature: OGRFeatureH) {
+    guarded((), || {
         // SAFETY: the shim gives a feature, which stays during the call.
         let data = unsafe { FeatureRef::new(feature) }.native_data();
-        let text = data.as_ref().map_or(ptr::null(), |(text, _)| text.as_ptr());
+        let text = data.as_ref().map_or(ptr::null(), |text| text.as_ptr());
         // SAFETY: as above; the text is null or a C string, which is copied.
         unsafe { gdal_sys::OGR_F_SetNativeData(feature, text) };
-        data.is_some_and(|(_, foreign)| foreign)
-    })
-}
-
-/// Warns of a layer whose features have foreign members that hold places.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn meshmark_warn_of_foreign_places(layer: *const c_char) {
-    // SAFETY: the shim gives a C string.
-    guarded((), || report(CPLErr::CE_Warning, foreign_places(&unsafe { text(layer) })));
+    });
 }
 
 /// Returns the native data of a layer, as a list of metadata, without positions; the caller frees

@@ -10,6 +10,7 @@ use crate::{
     ffi_source::Borrowed,
     ffi_text::{strings, text},
     marking::{MarkingRequest, split_options},
+    staged_layer::NATIVE_COLUMN,
     target::Target,
     writer::Writer,
 };
@@ -180,7 +181,9 @@ unsafe extern "C" fn meshmark_writer_finish(
             (*Box::from_raw(writer), Described::new(described), failure)
         };
         let name = writer.name().to_string();
-        let mark_source = |request: &MarkingRequest, source: &Borrowed| mark(name.clone(), request, source);
+        let mark_source = |request: &MarkingRequest, source: &Borrowed| {
+            mark(name.clone(), request, source, Some(NATIVE_COLUMN))
+        };
         let finished = writer.finish(&described, host_failure, &mark_source, threads());
         match finished {
             Ok(warnings) => {

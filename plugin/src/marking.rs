@@ -24,8 +24,10 @@ use meshmark_core::{
 use meshmark_dataset::{
     LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool, damage_warning,
     decimals::Digits,
+    exposure,
     marking::{self, Moves, Unmarked},
     same_file, survey,
+    traces::{self, ForeignMembers},
 };
 use std::{fs::File, path::Path};
 
@@ -54,6 +56,8 @@ pub struct MarkingRequest {
     subject: Subject,
     key: SecretKey,
     key_path: String,
+    /// The warning about a key file that others can read.
+    exposed: Option<String>,
 }
 
 impl MarkingRequest {
@@ -64,7 +68,7 @@ impl MarkingRequest {
         let options = Options::parse(ours.map(|(name, value)| (name.as_str(), value.as_str())))?;
         let subject = options.subject.clone().ok_or(Error::NoSubject)?;
         let key_path = options.key_path.clone().or(default_key_path).ok_or(Error::NoKey)?;
-        let key = read_key(&key_path)?;
+        let (key, exposed) = read_key(&key_path)?;
         if let Some(record) = &options.record_path {
             output::check_is_not_record(record)?;
             record_file::check_folder(Path::new(record))?;
@@ -72,7 +76,7 @@ impl MarkingRequest {
                 return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
-        Ok(MarkingRequest { options, subject, key, key_path })
+        Ok(MarkingRequest { options, subject, key, key_path, exposed })
     }
 
     /// Renames the chosen layers to the names under which they are staged; layers without such a
@@ -113,10 +117,14 @@ fn pool(threads: usize) -> Result<ThreadPool> {
     pool.map_err(Error::Threads)
 }
 
-fn read_key(path: &str) -> Result<SecretKey> {
+/// Reads a key file; returns a warning too if others can read it.
+fn read_key(path: &str) -> Result<(SecretKey, Option<String>)> {
     let unreadable = |source| Error::KeyUnreadable { path: path.into(), source };
-    let text = File::open(path).and_then(read_text).map_err(unreadable)?;
-    SecretKey::from_json(&text).map_err(|source| Error::KeyMalformed { path: path.into(), source })
+    let file = File::open(path).map_err(unreadable)?;
+    let exposed = exposure(Path::new(path), &file);
+    let text = read_text(file).map_err(unreadable)?;
+    let key = SecretKey::from_json(&text);
+    Ok((key.map_err(|source| Error::KeyMalformed { path: path.into(), source })?, exposed))
 }
 
 /// The source of a marking.
@@ -171,8 +179,8 @@ impl Marking {
         });
         map.geometries = None;
         let message = options.coefficients.is_none().then(|| request.subject.carried(&request.key));
-        let mut warnings = marking::warnings(options, message.as_ref(), &map, marked.patches, spelling);
-        warnings.extend(damage);
+        let of_mark = marking::warnings(options, message.as_ref(), &map, marked.patches, spelling);
+        let warnings = request.exposed.iter().cloned().chain(of_mark).chain(damage).collect();
         Ok(Marking {
             name: source.name,
             map,
@@ -182,6 +190,19 @@ impl Marking {
             files: source.files,
             warnings,
         })
+    }
+
+    /// Adds warnings about the traces in the source.
+    pub fn search_traces(
+        &mut self,
+        request: &MarkingRequest,
+        source: &Dataset,
+        foreign: &ForeignMembers,
+        last_failure: &dyn Fn() -> Option<String>,
+    ) -> Result<()> {
+        let found = traces::search(source, &self.map, &request.options, foreign, last_failure)?;
+        self.warnings.extend(traces::warnings(&found, &request.options, Spelling::OpenOption)?);
+        Ok(())
     }
 
     /// Writes the record to the path of the request.

@@ -16,7 +16,7 @@ use std::ffi::CString;
 /// The column for the styles of features.
 const STYLE_COLUMN: &str = "OGR_STYLE";
 /// The column for the native data of features from a GeoJSON file.
-const NATIVE_COLUMN: &str = "OGR_NATIVE";
+pub const NATIVE_COLUMN: &str = "OGR_NATIVE";
 /// The column for values that a GeoPackage would lose.
 const LOST_COLUMN: &str = "OGR_VALUES";
 
@@ -46,8 +46,6 @@ pub struct StagedLayer {
     last_id: i64,
     /// The number of features.
     features: usize,
-    /// Whether foreign members of its features hold places.
-    pub has_foreign_places: bool,
 }
 
 /// A value of a feature that a GeoPackage would lose.
@@ -97,7 +95,6 @@ impl StagedLayer {
             before_ids: None,
             last_id: 0,
             features: 0,
-            has_foreign_places: false,
         })
     }
 
@@ -125,7 +122,6 @@ impl StagedLayer {
     pub fn write(&mut self, staged: &Output, feature: FeatureRef) -> Result<i64> {
         let style = feature.style();
         let native = feature.native_data().filter(|_| self.is_json);
-        self.has_foreign_places |= native.as_ref().is_some_and(|(_, foreign)| *foreign);
         let id = feature.id();
         if id.is_some() {
             self.before_ids.get_or_insert(self.features);
@@ -155,7 +151,7 @@ impl StagedLayer {
             copy.set_text(column, &style);
         }
         if let Some((column, native)) = self.native_column.zip(native) {
-            copy.set_c_text(column, &native.0);
+            copy.set_c_text(column, &native);
         }
         for lost in &lost {
             if let Lost::Text(field, _) = *lost {

@@ -23,7 +23,6 @@ use crate::{
 use meshmark_core::recorded::Recorded;
 use meshmark_dataset::{
     Action, digest_of_only_file, file_digest, file_error,
-    marking::foreign_places,
     publication::{Move, Publication},
 };
 use std::{fs, path::Path};
@@ -172,9 +171,7 @@ impl Writer {
         let names = write_marked(&file, &target, &schema, &layers, &view, described)?;
         let written = read_back::Written { path: &file, format: target.format, layers: names };
         read_back::check(&written, &view, &request, threads)?;
-        let mut warnings = view.marking().warnings.clone();
-        let told = layers.iter().filter(|layer| layer.has_foreign_places);
-        warnings.extend(told.map(|layer| foreign_places(&layer.spec.name)));
+        let warnings = view.marking().warnings.clone();
         let record = view.marking().record.clone();
         drop((view, schema));
         let record = record.map(|record| with_digests(record, &places, &folder)).transpose()?;

@@ -5,11 +5,10 @@ pub fn power_of_ten(log10: f64) -> String {
     if log10 > -3.0 { format!("{:.3}", 10f64.powf(log10)) } else { format!("10^{log10:.1}") }
 }
 
-/// Returns text of a file on one line, without characters that control a terminal or change the
-/// text direction.
+/// Returns text of a file on one line, without characters that control a terminal, change the text
+/// direction or cannot be seen: no two names look alike because of them.
 pub fn printable(text: &str) -> String {
-    let turns = |c: char| matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    text.chars().map(|c| if c.is_control() || turns(c) { '\u{fffd}' } else { c }).collect()
+    meshmark_core::visible(text)
 }
 
 /// Quotes a word for a shell. Characters that change the text direction are escaped for bash, zsh
@@ -20,7 +19,8 @@ pub fn quoted(word: &str) -> String {
         let escaped = word.chars().map(|c| match c {
             '\'' | '\\' => format!("\\{c}"),
             c if printable(c.encode_utf8(&mut [0; 4])).starts_with(c) => c.into(),
-            c => format!("\\u{:04x}", u32::from(c)),
+            c if c.len_utf16() == 1 => format!("\\u{:04x}", u32::from(c)),
+            c => format!("\\U{:08x}", u32::from(c)),
         });
         return format!("$'{}'", escaped.collect::<String>());
     }
@@ -47,8 +47,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_shell_reads_hidden_characters_of_a_quoted_word() {
+        assert_eq!(quoted("A\u{200b}\u{e0041}B"), r"$'A\u200b\U000e0041B'");
+    }
+
+    #[test]
     fn names_do_not_steer_the_terminal() {
-        assert_eq!(printable("A\u{1b}[31m\nB é"), "A\u{fffd}[31m\u{fffd}B é");
-        assert_eq!(printable("HbmG \u{202e}EMCA"), "HbmG \u{fffd}EMCA");
+        assert_eq!(printable("A\u{1b}[31m\nB é"), r"A\u{1b}[31m\u{a}B é");
+        assert_eq!(printable("HbmG \u{202e}EMCA"), r"HbmG \u{202e}EMCA");
     }
 }

@@ -6,7 +6,8 @@
 
 use meshmark_core::key::SecretKey;
 use std::{
-    fs,
+    fs::{self, Permissions},
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::{Command, Output, Stdio},
 };
@@ -55,6 +56,9 @@ fn make_files(folder: &Path) {
     write("record_of_a_later_version.json", record.replace("_record\": 1", "_record\": 3").as_bytes());
     write("record_with_a_negative_amplitude.json", record.replace("0.1,", "-0.1,").as_bytes());
     write("record_with_a_comment.json", record.replacen("{", "{ \"comment\": \"\",", 1).as_bytes());
+    for key in ["key.json", "another_key.json", "changed_key.json"] {
+        fs::set_permissions(folder.join(key), Permissions::from_mode(0o600)).unwrap();
+    }
     make_records(folder, &record);
     write("text.txt", b"This is no map.\n");
     write("table.csv", b"name,height\nTown hall,20\n");

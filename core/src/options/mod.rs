@@ -36,6 +36,9 @@ pub struct Options {
     pub coefficients: Option<usize>,
     /// Layers to mark; all when `None`.
     pub layers: Option<Vec<String>>,
+    /// Whether a map with unmarked coordinates of its vertices beside its marked geometries is
+    /// refused.
+    pub refuses_traces: bool,
     /// CRS of the source when it has none.
     pub srs: Option<String>,
     /// Path of the record to write.
@@ -80,6 +83,7 @@ impl Options {
             },
             coefficients: is_fingerprint.then_some(COEFFICIENTS),
             layers: values.list("LAYERS")?,
+            refuses_traces: values.choice("ATTRIBUTES", refuses)?.expect("has a default"),
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
         })
@@ -115,6 +119,7 @@ impl Options {
             "LAYERS" => self.layers.as_ref().map(join_list),
             "SHAPE" => Some(p.shape.name().into()),
             "BASIS" => Some(p.basis.name().into()),
+            "ATTRIBUTES" => Some(if self.refuses_traces { "REFUSE" } else { "WARN" }.into()),
             "SRS" => self.srs.clone(),
             "RECORD" => self.record_path.clone(),
             _ => panic!("{option} is no option"),
@@ -136,6 +141,12 @@ impl Parameters {
     pub fn of_fingerprint() -> Self {
         Options::parse_for_recipients([]).expect("the defaults are legal").parameters
     }
+}
+
+/// Reads the value of ATTRIBUTES.
+fn refuses(word: &str) -> Option<bool> {
+    let is = |known: &str| word.eq_ignore_ascii_case(known);
+    (is("WARN") || is("REFUSE")).then(|| is("REFUSE"))
 }
 
 impl Default for Parameters {
@@ -221,6 +232,7 @@ mod tests {
             ("LAYERS", r#" "a ""b"", c" ,d"#),
             ("SHAPE", "rigid"),
             ("BASIS", "Cotangent"),
+            ("ATTRIBUTES", "refuse"),
             ("SRS", "EPSG:3067"),
             ("RECORD", "acme.json"),
         ];
@@ -248,6 +260,7 @@ mod tests {
         assert!(error(&[("CODE", "morse")]).contains("CODE=morse is not REPETITION or LDPC"));
         assert!(error(&[("SHAPE", "round")]).contains("SHAPE=round is not FREE or RIGID or STIFF"));
         assert!(error(&[("BASIS", "sines")]).contains("BASIS=sines is not BIGGS or COTANGENT"));
+        assert!(error(&[("ATTRIBUTES", "DROP")]).contains("ATTRIBUTES=DROP is not WARN or REFUSE"));
         let short = error(&[("CODE", "LDPC"), ("MESSAGE", "0123456789abcdef")]);
         assert!(short.contains("exactly 128 bits, not 64: use 32 hexadecimal digits"), "{short}");
         assert!(error(&[("COLOUR", "red")]).contains("unknown option COLOUR: use KEY, "));

@@ -175,6 +175,13 @@ pub const OPTIONS: &[OptionSpec] = &[
         true,
         "Mesh Laplacian: BIGGS is that of the paper; COTANGENT bends angles less and needs the very same reference",
     ),
+    row(
+        "ATTRIBUTES",
+        Kind::Choice(&["WARN", "REFUSE"]),
+        Some("WARN"),
+        false,
+        "WARN of unmarked coordinates of vertices in attributes, foreign members and layers left out, or REFUSE to mark",
+    ),
     row("SRS", Kind::Text, None, true, "CRS of the source when it has none, for example EPSG:3067"),
     row(
         "RECORD",

@@ -1,7 +1,7 @@
 //! Subcommands and their flags. The table of marking options generates the flags of those options.
 
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum, value_parser};
-use meshmark_core::options::{OPTIONS, Spelling};
+use meshmark_core::options::{OPTIONS, OptionSpec, Spelling};
 use meshmark_detection::{Demodulator, registration::Start};
 use meshmark_verifier::ExitCode;
 use std::path::PathBuf;
@@ -210,9 +210,9 @@ pub(super) struct DistributeFlags(pub(super) Vec<(&'static str, String)>);
 
 const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
 
-/// Returns a flag for every option that shapes the mark.
-fn flags(heading: &'static str) -> impl Iterator<Item = Arg> {
-    OPTIONS.iter().filter(|option| option.shapes_mark).map(move |option| {
+/// Returns a flag for every option that `is_wanted`.
+fn flags(heading: &'static str, is_wanted: fn(&OptionSpec) -> bool) -> impl Iterator<Item = Arg> {
+    OPTIONS.iter().filter(move |option| is_wanted(option)).map(move |option| {
         let default = option.default.map_or(String::new(), |d| format!(" [default: {d}]"));
         Arg::new(option.name)
             .long(Spelling::Flag.name(option.name)[2..].to_string())
@@ -232,7 +232,7 @@ fn given(matches: &ArgMatches) -> Vec<(&'static str, String)> {
 impl Args for MarkingFlags {
     fn augment_args(command: Command) -> Command {
         let heading = "How the map was marked (taken from the record when there is one)";
-        command.args(flags(heading).map(|flag| flag.conflicts_with("records")))
+        command.args(flags(heading, |option| option.shapes_mark).map(|flag| flag.conflicts_with("records")))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -253,8 +253,10 @@ impl FromArgMatches for MarkingFlags {
 
 impl Args for DistributeFlags {
     fn augment_args(command: Command) -> Command {
-        let is_subject = |flag: &Arg| SUBJECTS.iter().any(|subject| flag.get_id() == subject);
-        command.args(flags("How the map is marked").filter(|flag| !is_subject(flag)))
+        let is_wanted = |option: &OptionSpec| {
+            option.shapes_mark && !SUBJECTS.contains(&option.name) || option.name == "ATTRIBUTES"
+        };
+        command.args(flags("How the map is marked", is_wanted))
     }
 
     fn augment_args_for_update(command: Command) -> Command {

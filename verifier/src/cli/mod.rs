@@ -45,9 +45,7 @@ pub fn run() -> u8 {
 }
 
 fn keygen(path: &PathBuf) -> Result<()> {
-    let mut secret = zeroize::Zeroizing::new([0; 32]);
-    getrandom::fill(secret.as_mut_slice()).map_err(|source| Error::Random { source })?;
-    let key = SecretKey::from_bytes(*secret);
+    let key = SecretKey::filled(getrandom::fill).map_err(|source| Error::Random { source })?;
     let failed = |error: std::io::Error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Exists {
             path: path.clone(),
@@ -103,7 +101,7 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let request = distribute::DistributeRequest {
         options: Options::parse_for_recipients(flags)?,
-        key: texts::key(&args.key)?,
+        key: texts::key(&args.key, &mut warn)?,
         map: args.map,
         recipients: args.recipients,
         folder: args.output_dir,

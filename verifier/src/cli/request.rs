@@ -1,6 +1,6 @@
 //! The request of `verify`, made from flags, key and record.
 
-use super::arguments::VerifyArgs;
+use super::{arguments::VerifyArgs, printing::warn};
 use meshmark_core::{
     key::{RECIPIENT_BITS, SecretKey},
     options::{Options, Spelling, Subject},
@@ -16,7 +16,7 @@ use meshmark_verifier::{
 /// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
 /// either.
 pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<Request>> {
-    let key = texts::key(&args.key)?;
+    let key = texts::key(&args.key, &mut warn)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let possible = match &record {

@@ -4,7 +4,7 @@
 use crate::{Error, Result};
 use meshmark_dataset::{
     Action, file_error,
-    geojson_text::{self, Place, numbers, places},
+    geojson_text::{Place, numbers, places},
 };
 use std::{
     fs::File,
@@ -29,16 +29,16 @@ pub fn write(plain: &Path, marked: &Path, file: &Path) -> Result<()> {
     }
 }
 
-/// Returns whether foreign members of a feature hold geometries or bounding boxes.
-pub fn has_foreign_places(path: &Path) -> Result<bool> {
+/// Calls `f` with every feature of a file.
+pub fn for_each_feature(path: &Path, mut f: impl FnMut(&[u8])) -> Result<()> {
     let failed = |error| file_error(Action::Reading, path, error);
     let (mut file, mut line) = (File::open(path).map(BufReader::new).map_err(failed)?, Vec::new());
     while next(&mut file, &mut line).map_err(failed)? {
-        if is_feature(&line) && geojson_text::has_foreign_places(&line) {
-            return Ok(true);
+        if is_feature(&line) {
+            f(&line);
         }
     }
-    Ok(false)
+    Ok(())
 }
 
 fn join(mut plain: impl BufRead, mut marked: impl BufRead, mut to: impl Write) -> io::Result<()> {

@@ -4,10 +4,12 @@
 
 use super::{flatgeobuf, geojson, moving, ogr2ogr, staged::Staged};
 use crate::{Error, Result};
+use meshmark_core::options::Options;
 use meshmark_dataset::{
-    Action, file_error,
+    Action, Survey, file_error,
     formats::Format,
-    marking::{Moves, foreign_places},
+    marking::Moves,
+    traces::{ForeignSearch, Trace},
 };
 use std::{
     fs,
@@ -27,17 +29,21 @@ impl Plain {
     /// Copies the single layer of a map into an empty folder; `warn` receives the warnings of
     /// `ogr2ogr`.
     pub fn new(
-        (map, layer): (&Path, &str),
+        map: &Path,
         folder: &Path,
         format: &'static Format,
         warn: &mut dyn FnMut(&str),
     ) -> Result<Self> {
         let path = folder.join("map").with_extension(&format.ending()[1..]);
         ogr2ogr::copy(format.driver, map, &path, &[])?.iter().for_each(|text| warn(text));
-        if format.has_native_data() && geojson::has_foreign_places(&path)? {
-            warn(&foreign_places(layer));
-        }
         Ok(Plain { path, driver: format.driver })
+    }
+
+    /// Returns the traces in foreign members of GeoJSON.
+    pub fn search_traces(&self, map: &Survey, options: &Options, layer: &str) -> Result<Option<Trace>> {
+        let mut search = ForeignSearch::new(map, options)?;
+        geojson::for_each_feature(&self.path, |feature| search.add(feature))?;
+        Ok(search.trace(layer))
     }
 
     /// Writes a copy with moved vertices and returns the warnings of `ogr2ogr`; `work` is a folder

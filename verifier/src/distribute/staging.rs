@@ -6,7 +6,8 @@ use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Layer, LayerAccess, LayerOptions},
 };
-use meshmark_dataset::{Error as MapError, Survey, formats::Format, parse_srs, workplace::Workplace};
+use meshmark_core::options::Spelling;
+use meshmark_dataset::{Error as MapError, Survey, formats::Format, parse_srs, traces, workplace::Workplace};
 use std::path::Path;
 
 /// The base of all copies.
@@ -40,8 +41,13 @@ impl Stage {
             ogr2ogr::copy("GPKG", &request.map, &path, &options)?.iter().for_each(|text| warn(text));
             (Staged::read(path, &map.data.vertices, marks)?, None)
         } else {
-            let plain = Plain::new((&request.map, &layers[0]), &workplace.subfolder("plain")?, format, warn)?;
+            let plain = Plain::new(&request.map, &workplace.subfolder("plain")?, format, warn)?;
             let failed = |error| maps::failed("map", &request.map, error);
+            if format.has_native_data() {
+                let found = plain.search_traces(map, &request.options, &layers[0])?;
+                let warnings = traces::warnings(found.as_slice(), &request.options, Spelling::Flag);
+                warnings.map_err(failed)?.iter().for_each(|text| warn(text));
+            }
             copy_geometries(dataset.layer(0).map_err(|error| failed(error.into()))?, &path)
                 .map_err(|error| Error::unwritten(path.display(), error))?;
             (Staged::read(path, &map.data.vertices, |_| true)?, Some(plain))

@@ -8,10 +8,15 @@ use super::{
 };
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
-use meshmark_core::{ground::Ground, options::Options, scale::ScaleLattice};
+use meshmark_core::{
+    ground::Ground,
+    options::{Options, Spelling},
+    scale::ScaleLattice,
+};
 use meshmark_dataset::{
     CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, features, marked_view,
     marking, survey,
+    traces::{self, ForeignMembers},
 };
 use std::{collections::BTreeSet, path::Path};
 
@@ -71,7 +76,12 @@ pub(crate) fn source(
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
     let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
     let survey = read("map", path, &dataset, &reading)?;
-    marking::coordinates_as_text(&dataset).iter().for_each(|text| warn(text));
+    // Foreign members of GeoJSON are read from the plain copy (distribute/plain.rs).
+    let foreign = ForeignMembers { of: &|_| None, column: None };
+    forget_failure();
+    let found = traces::search(&dataset, &survey, options, &foreign, &last_failure)
+        .and_then(|found| traces::warnings(&found, options, Spelling::Flag));
+    found.map_err(|error| failed("map", path, error))?.iter().for_each(|text| warn(text));
     Ok((dataset, survey))
 }
 

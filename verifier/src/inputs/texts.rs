@@ -5,13 +5,19 @@ use meshmark_core::{
     key::{SecretKey, read_text},
     recorded::Recorded,
 };
+use meshmark_dataset::exposure;
 use std::{fs::File, io, path::Path};
 use zeroize::Zeroizing;
 
-/// Reads a key file.
-pub fn key(path: &Path) -> Result<SecretKey> {
-    let text = text(path).map_err(|source| Error::TextUnread { what: "key", path: path.into(), source })?;
-    SecretKey::from_json(&text).map_err(|source| Error::Malformed { path: path.into(), source })
+/// Reads a key file; `warn` receives a warning if others can read it too.
+pub fn key(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<SecretKey> {
+    let unread = |source| Error::TextUnread { what: "key", path: path.into(), source };
+    let file = File::open(path).map_err(unread)?;
+    let exposed = exposure(path, &file);
+    let text = read_text(file).map_err(unread)?;
+    let key = SecretKey::from_json(&text).map_err(|source| Error::Malformed { path: path.into(), source })?;
+    exposed.iter().for_each(|text| warn(text));
+    Ok(key)
 }
 
 /// Reads a record of either version.
