@@ -139,7 +139,7 @@ fn run_verify(args: VerifyArgs) -> Result<ExitCode> {
     let digest = || Digests::read(&args.key, &references, &suspect, args.record.as_deref());
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
-    let request = request(args, suspect.clone())?;
+    let request = request(args, suspect.clone(), &mut warn)?;
     let mut progress = Progress::default();
     let mut report = match &records {
         Some(folder) => verify_records(&request, &references, folder, &mut progress, &mut warn)?,

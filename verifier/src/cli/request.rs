@@ -14,8 +14,8 @@ use meshmark_verifier::{
 };
 
 /// Combines key, record and flags.
-pub(super) fn request(args: VerifyArgs, suspect: PrivateCopy) -> Result<Request> {
-    let key = texts::key(&args.key, &mut super::warn)?;
+pub(super) fn request(args: VerifyArgs, suspect: PrivateCopy, warn: &mut dyn FnMut(&str)) -> Result<Request> {
+    let key = texts::key(&args.key, warn)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let options = Options::parse(flags)?;
