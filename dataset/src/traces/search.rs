@@ -1,8 +1,8 @@
 //! The search for traces in a dataset.
 
 use super::{
-    Kind, Trace,
     numbers::{bytes_of_digits, of_text, of_value, pairs_of_bytes},
+    trace::{Kind, Trace},
     vertices::{Tally, Vertices},
 };
 use crate::{
