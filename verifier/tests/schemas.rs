@@ -1,5 +1,7 @@
 //! docs/*.schema.json describe what the programs write, and nothing else.
 
+mod common;
+
 use meshmark_core::{
     code::Code,
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
@@ -166,7 +168,8 @@ fn report_file(arguments: &[&str]) -> Value {
 
 #[test]
 fn report_files_are_valid_whatever_the_verdict() {
-    let verify = ["verify", "--key", "vectors/key.json", "--reference", "kotka.gpkg"];
+    let key = common::key().display().to_string();
+    let verify = ["verify", "--key", &key, "--reference", "kotka.gpkg"];
     let record = ["--record", "vectors/record.json"];
     for arguments in [
         vec![record[0], record[1], "vectors/marked.gpkg"],
@@ -279,17 +282,17 @@ fn the_ranges_are_those_of_the_options() {
                 _ => "",
             };
             let pointer = format!("{object}/{}{unit}", option.name.to_lowercase());
-            let (legal, illegal) = match option.kind {
+            let (legal, illegal): (Vec<Value>, _) = match option.kind {
                 Kind::Text => continue,
                 Kind::Choice(words) => {
-                    let [one, two] = words else { panic!("{} has two words", option.name) };
-                    ([json!(one.to_lowercase()), json!(two.to_lowercase())], [json!(one), json!("morse")])
+                    let legal = words.iter().map(|word| json!(word.to_lowercase())).collect();
+                    (legal, [json!(words[0]), json!("morse")])
                 }
                 Kind::Number(above, most) => {
-                    ([json!(above + 1e-9), json!(most)], [json!(above), json!(most * 1.01)])
+                    (vec![json!(above + 1e-9), json!(most)], [json!(above), json!(most * 1.01)])
                 }
                 Kind::Integer(least, most) => {
-                    ([json!(least), json!(most)], [json!(least - 1), json!(most + 1)])
+                    (vec![json!(least), json!(most)], [json!(least - 1), json!(most + 1)])
                 }
             };
             legal.into_iter().for_each(|value| assert_valid(name, &with(&document, &pointer, value)));
@@ -315,7 +318,8 @@ fn report_and_warnings(suspect: &str, flags: &[&str]) -> (Value, String) {
     };
     let output = Command::new(env!("CARGO_BIN_EXE_meshmark"))
         .current_dir(root().join("fixtures"))
-        .args(["verify", "--json", "--key", "vectors/key.json", "--reference", "kotka.gpkg"])
+        .args(["verify", "--json", "--reference", "kotka.gpkg", "--key"])
+        .arg(common::key())
         .args(flags)
         .arg(file)
         .output()

@@ -3,8 +3,10 @@
 
 use std::{
     fs,
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::{Child, Command, Output},
+    sync::OnceLock,
     thread::sleep,
     time::Duration,
 };
@@ -14,13 +16,27 @@ pub fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures").join(name)
 }
 
+/// A copy of the key of the test vectors that its owner alone can read, as a check-out of the fixtures
+/// gives others rights, which the command warns of.
+pub fn key() -> PathBuf {
+    static KEY: OnceLock<PathBuf> = OnceLock::new();
+    let copy = || {
+        let name = format!("key_{}.json", std::process::id());
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        fs::copy(fixture("vectors/key.json"), &path).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        path
+    };
+    KEY.get_or_init(copy).clone()
+}
+
 /// `meshmark verify` of a suspect against the test vectors.
 pub fn command(suspect: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_meshmark"));
     command
         .env("GDAL_DRIVER_PATH", "none")
         .args(["verify", "--key"])
-        .arg(fixture("vectors/key.json"))
+        .arg(key())
         .arg("--record")
         .arg(fixture("vectors/record.json"))
         .arg("--reference")
