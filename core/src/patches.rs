@@ -9,7 +9,7 @@ use crate::{
     mesh::Mesh,
     nearness::{VertexTree, cross, dot},
     options::{Laplacian, Parameters, Rigidity},
-    stiffness::{Strains, strains},
+    stiffness::{Place, Strains, strains},
 };
 use faer::Mat;
 use rayon::prelude::*;
@@ -62,6 +62,15 @@ impl Patch {
         }
     }
 
+    /// Returns the rows that neither belong to a body nor hang.
+    pub(crate) fn free_rows(&self) -> Vec<usize> {
+        let mut is_free = vec![true; self.vertices.len()];
+        let of_bodies = self.bodies.iter().flat_map(|body| &body.rows);
+        let hanging = self.hanging.iter().map(|hanging| &hanging.row);
+        of_bodies.chain(hanging).for_each(|&row| is_free[row as usize] = false);
+        (0..is_free.len()).filter(|&row| is_free[row]).collect()
+    }
+
     /// Returns whether a vertex hangs on vertices of other patches, so that this patch does not
     /// determine its movement.
     pub(crate) fn hangs_elsewhere(&self, row: usize) -> bool {
@@ -112,7 +121,8 @@ impl Patches {
         patches.par_iter_mut().for_each(|patch| bridge(patch, &points));
         constrain(&mut patches, &constraints, &place);
         if parameters.shape == Rigidity::Stiff {
-            let strains = strains(map, &constraints, &place, patches.len());
+            let places: Vec<Place> = place.iter().map(|place| [place.patch, place.row]).collect();
+            let strains = strains(map, &constraints, &places, patches.len());
             patches.iter_mut().zip(strains).for_each(|(patch, strains)| patch.strains = strains);
         }
         if parameters.basis == Laplacian::Cotangent {

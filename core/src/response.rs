@@ -84,7 +84,7 @@ impl Response {
             true => Response::Separate(basis),
             false => {
                 let mut blocks = coupled(patch, basis);
-                stiffen(patch, &mut blocks);
+                stiffen(&patch.strains, &patch.free_rows(), &mut blocks);
                 Response::Coupled(blocks)
             }
         };

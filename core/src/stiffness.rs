@@ -10,12 +10,7 @@
 //!
 //! Vertices of other patches count as unmoved, so that no segment bends between two patches.
 
-use crate::{
-    constraints::Constraints,
-    junctions::JUNCTION_M,
-    map::Map,
-    patches::{Patch, PatchRow},
-};
+use crate::{constraints::Constraints, junctions::JUNCTION_M, map::Map};
 use faer::{
     Mat, Side,
     linalg::solvers::Solve,
@@ -60,17 +55,20 @@ impl Strains {
     }
 }
 
-/// Returns the strains of every patch.
+/// The patch of a vertex and its row there.
+pub(crate) type Place = [u32; 2];
+
+/// Returns the strains of every patch; `places` are those of all vertices.
 pub(crate) fn strains(
     map: &Map,
     constraints: &Constraints,
-    places: &[PatchRow],
+    places: &[Place],
     patches: usize,
 ) -> Vec<Strains> {
     let joints = Joints { map, constraints, places, neighbours: neighbours(map, constraints) };
     let mut all = vec![Strains::default(); patches];
     for vertex in (0..map.vertices.len() as u32).filter(|&vertex| !joints.is_in_body(vertex)) {
-        let strains = &mut all[places[vertex as usize].patch as usize];
+        let strains = &mut all[places[vertex as usize][0] as usize];
         joints.add(vertex, strains);
     }
     all
@@ -96,7 +94,7 @@ fn neighbours(map: &Map, constraints: &Constraints) -> Vec<Vec<u32>> {
 struct Joints<'a> {
     map: &'a Map<'a>,
     constraints: &'a Constraints,
-    places: &'a [PatchRow],
+    places: &'a [Place],
     neighbours: Vec<Vec<u32>>,
 }
 
@@ -111,7 +109,7 @@ struct Spoke {
 impl Joints<'_> {
     /// Adds the strains of the joint at a vertex, and of the segments that count there.
     fn add(&self, vertex: u32, strains: &mut Strains) {
-        let patch = self.places[vertex as usize].patch;
+        let [patch, _] = self.places[vertex as usize];
         let spokes = self.spokes(vertex);
         let pairs = if spokes.len() == 2 { 1 } else { spokes.len() };
         for (i, spoke) in spokes.iter().enumerate().take(if spokes.len() > 1 { pairs } else { 0 }) {
@@ -123,7 +121,7 @@ impl Joints<'_> {
         }
         for spoke in &spokes {
             // A segment between patches counts in both.
-            let counts_there = self.places[spoke.end as usize].patch == patch && spoke.end < vertex;
+            let counts_there = self.places[spoke.end as usize][0] == patch && spoke.end < vertex;
             if !counts_there && !self.is_in_body(spoke.end) {
                 let terms = spoke.stretch(vertex).into_iter();
                 strains.push(terms.flat_map(|term| self.rows(patch, term)));
@@ -153,9 +151,9 @@ impl Joints<'_> {
             None => vec![(vertex, 1.0)],
         };
         anchors.into_iter().filter_map(move |(anchor, weight)| {
-            let place = self.places[anchor as usize];
-            let moves = place.patch == patch && !self.is_in_body(anchor);
-            moves.then(|| (place.row, by.map(|derivative| weight * derivative)))
+            let [its_patch, row] = self.places[anchor as usize];
+            let moves = its_patch == patch && !self.is_in_body(anchor);
+            moves.then(|| (row, by.map(|derivative| weight * derivative)))
         })
     }
 
@@ -186,14 +184,13 @@ impl Spoke {
     }
 }
 
-/// Replaces the wanted response of the vertices that neither belong to a body nor hang by the stiff
-/// one: `[a][b]` holds the displacements along axis a (n × k) by coefficients of axis b.
-pub(crate) fn stiffen(patch: &Patch, blocks: &mut [[Mat<f64>; 2]; 2]) {
-    if patch.strains.is_empty() {
+/// Replaces the wanted response of the `free` rows, which neither belong to a body nor hang, by the
+/// stiff one: `[a][b]` holds the displacements along axis a (n × k) by coefficients of axis b.
+pub(crate) fn stiffen(strains: &Strains, free: &[usize], blocks: &mut [[Mat<f64>; 2]; 2]) {
+    if strains.is_empty() {
         return;
     }
-    let free = free_rows(patch);
-    let factor = normal_matrix(patch, &free)
+    let factor = normal_matrix(strains, free, blocks[0][0].nrows())
         .sp_cholesky(Side::Lower)
         .expect("the identity and squares are positive definite");
     for of_coefficients in 0..2 {
@@ -213,23 +210,14 @@ pub(crate) fn stiffen(patch: &Patch, blocks: &mut [[Mat<f64>; 2]; 2]) {
     }
 }
 
-/// Returns the rows of a patch that neither belong to a body nor hang.
-fn free_rows(patch: &Patch) -> Vec<usize> {
-    let mut is_free = vec![true; patch.vertices.len()];
-    let of_bodies = patch.bodies.iter().flat_map(|body| &body.rows);
-    let hanging = patch.hanging.iter().map(|hanging| &hanging.row);
-    of_bodies.chain(hanging).for_each(|&row| is_free[row as usize] = false);
-    (0..is_free.len()).filter(|&row| is_free[row]).collect()
-}
-
 /// Returns the lower triangle of I + Σ g gᵀ over the gradients g of all strains; unknown 2 i + a is
 /// the displacement of free row i along axis a.
-fn normal_matrix(patch: &Patch, free: &[usize]) -> SparseColMat<usize, f64> {
-    let mut number = vec![usize::MAX; patch.vertices.len()];
+fn normal_matrix(strains: &Strains, free: &[usize], rows: usize) -> SparseColMat<usize, f64> {
+    let mut number = vec![usize::MAX; rows];
     free.iter().enumerate().for_each(|(i, &row)| number[row] = i);
     let mut entries: Vec<Triplet<usize, usize, f64>> =
         (0..2 * free.len()).map(|i| Triplet::new(i, i, 1.0)).collect();
-    for terms in patch.strains.iter() {
+    for terms in strains.iter() {
         let gradient =
             terms.iter().flat_map(|&(row, by)| [0, 1].map(|a| (2 * number[row as usize] + a, by[a])));
         let gradient: Vec<(usize, f64)> = gradient.collect();
@@ -323,7 +311,7 @@ mod tests {
         let y = Mat::from_fn(count, 2, |row, column| if column == 0 { 0.0 } else { 1e-3 * at(row)[0] });
         let zeros = || Mat::zeros(count, 2);
         let mut blocks = [[x.clone(), zeros()], [y.clone(), zeros()]];
-        stiffen(patch, &mut blocks);
+        stiffen(&patch.strains, &patch.free_rows(), &mut blocks);
         for (block, expected) in [(&blocks[0][0], &x), (&blocks[1][0], &y)] {
             assert!((block - expected).norm_max() < 1e-9, "{}", (block - expected).norm_max());
         }

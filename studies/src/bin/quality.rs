@@ -72,7 +72,8 @@ const HEADER: &str = "\
 
 fn row(map: &Path, shape: &str, basis: &str, marked: &Marked) -> String {
     let n = |pointer: &str| marked.number(pointer);
-    let record = |pointer: &str| marked.record.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let distortion = &marked.record["distortion"];
+    let record = |pointer: &str| distortion.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
     format!(
         "| {} | {} | {} | {} | {} | {} | {}, {} | {}, {}, {} | {}, {} | {:.2}, {:.1} | {:.1} % | {:.3}, {:.2} | {:.3} |",
         map.file_stem().unwrap_or_default().to_string_lossy(),
