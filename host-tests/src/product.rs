@@ -1,7 +1,7 @@
 //! The product as its users have it: the driver inside `ogr2ogr`, and the command `meshmark`.
 
 use crate::{Result, attacks::Random, built};
-use meshmark_core::key::SecretKey;
+use meshmark_core::{key::SecretKey, options::Spelling};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
@@ -18,7 +18,7 @@ pub struct Product {
     options: Vec<String>,
 }
 
-/// The way in which the bits of the message become chips.
+/// What the mark carries, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Profile {
     pub code: &'static str,
@@ -34,9 +34,23 @@ impl Profile {
     /// LDPC: 256 code bits of one chip each, with the displacement of c = 2.
     pub const LDPC: Profile = Profile { code: "LDPC", chip_rate: 1 };
 
+    /// The fingerprint of the recipient, with the defaults.
+    pub const FINGERPRINT: Profile = Profile { code: "FINGERPRINT", chip_rate: 0 };
+
+    /// Returns the options that ask for it.
+    fn options(self) -> Vec<(&'static str, String)> {
+        match self {
+            Profile::FINGERPRINT => Vec::new(),
+            Profile { code, chip_rate } => {
+                vec![("CODE", code.into()), ("CHIP_RATE", chip_rate.to_string())]
+            }
+        }
+    }
+
     /// Returns a short name.
     pub fn name(&self) -> String {
         match self {
+            &Profile::FINGERPRINT => "fingerprint".into(),
             &Profile::LDPC => "LDPC".into(),
             other => format!("c={}", other.chip_rate),
         }
@@ -166,12 +180,10 @@ impl Product {
         let options = [
             ("KEY", marking.key.display().to_string()),
             ("RECIPIENT", marking.recipient.into()),
-            ("CODE", marking.profile.code.into()),
-            ("CHIP_RATE", marking.profile.chip_rate.to_string()),
             ("PRECISION", marking.precision.to_string()),
             ("RECORD", record.display().to_string()),
         ];
-        self.export(source, marked, options)
+        self.export(source, marked, options.into_iter().chain(marking.profile.options()))
     }
 
     /// Marks `source` on export to a GeoPackage with these options of the driver and those of the
@@ -218,8 +230,13 @@ impl Product {
             Asked::Record(record) => command.arg("--record").arg(record),
             Asked::Marking(marking) => command
                 .args(["--recipient", marking.recipient])
-                .args(["--code", marking.profile.code])
-                .arg(format!("--chip-rate={}", marking.profile.chip_rate))
+                .args(
+                    marking
+                        .profile
+                        .options()
+                        .into_iter()
+                        .map(|(name, value)| Spelling::Flag.value(name, value)),
+                )
                 .arg(format!("--precision={}", marking.precision))
                 .args(self.options.iter().map(|option| format!("--{}", option.to_lowercase()))),
         };

@@ -61,11 +61,11 @@ impl Case {
     }
 
     /// Returns the demodulators of the case. Collusions, which are many, use the default one alone,
-    /// and the paper's demodulator has no code.
+    /// and the paper's demodulator has neither code nor fingerprint.
     pub fn demodulators(&self, profile: Profile) -> &'static [&'static str] {
         match self {
             Case::Collusion { .. } => &["joint"],
-            _ if profile == Profile::LDPC => &["joint"],
+            _ if [Profile::LDPC, Profile::FINGERPRINT].contains(&profile) => &["joint"],
             _ => &DEMODULATORS,
         }
     }

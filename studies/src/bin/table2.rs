@@ -82,7 +82,9 @@ fn run_all(arguments: Arguments) -> Result<()> {
         maps: geopackages(&arguments.maps)?,
         profiles: match (quick, arguments.profiles.as_slice()) {
             (true, []) => vec![Profile::repetition(2)],
-            (false, []) => vec![Profile::repetition(2), Profile::repetition(3), Profile::LDPC],
+            (false, []) => {
+                vec![Profile::repetition(2), Profile::repetition(3), Profile::LDPC, Profile::FINGERPRINT]
+            }
             (_, profiles) => profiles.to_vec(),
         },
         wanted: Box::new(wanted),
@@ -111,8 +113,9 @@ fn run_all(arguments: Arguments) -> Result<()> {
 fn profile(text: &str) -> std::result::Result<Profile, String> {
     match (text, text.parse()) {
         ("LDPC", _) => Ok(Profile::LDPC),
+        ("FINGERPRINT", _) => Ok(Profile::FINGERPRINT),
         (_, Ok(chip_rate)) => Ok(Profile::repetition(chip_rate)),
-        _ => Err("say LDPC, or a chip rate".into()),
+        _ => Err("say FINGERPRINT, LDPC, or a chip rate".into()),
     }
 }
 

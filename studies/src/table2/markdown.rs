@@ -16,10 +16,13 @@ use std::fmt::Write;
 
 /// Returns all tables.
 pub fn report(all: &[Outcome], seed: u64, version: &str) -> String {
-    let (coded, outcomes): (Vec<Outcome>, Vec<Outcome>) =
-        all.iter().cloned().partition(|o| o.profile == Profile::LDPC);
+    let of_profile = |profile| all.iter().filter(|o| o.profile == profile).cloned().collect::<Vec<_>>();
+    let (fingerprints, coded) = (of_profile(Profile::FINGERPRINT), of_profile(Profile::LDPC));
+    let is_repeated = |o: &&Outcome| ![Profile::FINGERPRINT, Profile::LDPC].contains(&o.profile);
+    let outcomes: Vec<Outcome> = all.iter().filter(is_repeated).cloned().collect();
     let outcomes = outcomes.as_slice();
     let mut text = head(all, seed, version);
+    text += &recipients(&fingerprints);
     text += &averages(outcomes, Table::Paper);
     text += &averages(outcomes, Table::Extended);
     text += &whole_messages(outcomes, &coded);
@@ -48,6 +51,42 @@ fn head(outcomes: &[Outcome], seed: u64, version: &str) -> String {
         maps.len(),
         maps.join(", ")
     )
+}
+
+/// Returns the evidence about the recipients of fingerprints, a row for every attack.
+fn recipients(fingerprints: &[Outcome]) -> String {
+    if fingerprints.is_empty() {
+        return String::new();
+    }
+    let mut text =
+        "## Fingerprints: the right recipient\n\n| | attack | match | median p | largest p | map of the \
+                    largest p |\n|---|---|---|---|---|---|\n"
+            .to_string();
+    let guilty = |o: &&Outcome| o.guilty;
+    for id in distinct(fingerprints.iter().filter(guilty).map(|o| o.case.as_str())) {
+        let mut of_case: Vec<&Outcome> =
+            fingerprints.iter().filter(guilty).filter(|o| o.case == id).collect();
+        let p = |o: &Outcome| o.p_value_log10.unwrap_or(0.0);
+        of_case.sort_by(|a, b| p(a).total_cmp(&p(b)));
+        let (worst, median) = (of_case[of_case.len() - 1], of_case[of_case.len() / 2]);
+        let matches = of_case.iter().filter(|o| is_match(o)).count();
+        let _ = writeln!(
+            text,
+            "| {id} | {} | {matches} of {} | {} | {} | {} |",
+            worst.title,
+            of_case.len(),
+            power_of_ten(p(median)),
+            power_of_ten(p(worst)),
+            worst.map
+        );
+    }
+    let accused = fingerprints.iter().filter(|o| !o.guilty && is_match(o)).count();
+    let innocents = fingerprints.iter().filter(|o| !o.guilty).count();
+    text + &format!("\n{accused} of {innocents} recipients who had no part in the suspect were named.\n\n")
+}
+
+fn power_of_ten(log10: f64) -> String {
+    format!("10^{log10:.0}")
 }
 
 /// Returns one row for every attack, averaged over maps.
@@ -145,7 +184,7 @@ fn whole_messages(plain: &[Outcome], coded: &[Outcome]) -> String {
 }
 
 fn p_value(cell: &Cell) -> String {
-    cell.p_value_log10.map_or("–".into(), |p| format!("10^{p:.0}"))
+    cell.p_value_log10.map_or("–".into(), power_of_ten)
 }
 
 /// Returns the table of suspects with several questions, or in which no recipient may be found.
