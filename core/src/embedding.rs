@@ -283,7 +283,7 @@ enum Synthesis<'a> {
     /// bits of marks of messages depend on this order.
     Basis { basis: &'a Basis, gain: f64 },
     /// The response, with all constraints.
-    Response(Response),
+    Response(Box<Response>),
 }
 
 impl<'a> Synthesis<'a> {
@@ -295,7 +295,7 @@ impl<'a> Synthesis<'a> {
                 let gain = Response::new(patch, carriers()).gain(patch, carriers());
                 Synthesis::Basis { basis, gain }
             }
-            _ => Synthesis::Response(Response::carriers(patch, basis, parameters)),
+            _ => Synthesis::Response(Box::new(Response::carriers(patch, basis, parameters))),
         }
     }
 

@@ -193,18 +193,19 @@ pub(crate) fn stiffen(strains: &Strains, free: &[usize], blocks: &mut [[Mat<f64>
     let factor = normal_matrix(strains, free, blocks[0][0].nrows())
         .sp_cholesky(Side::Lower)
         .expect("the identity and squares are positive definite");
-    for of_coefficients in 0..2 {
-        let columns = blocks[0][of_coefficients].ncols();
+    let [[xx, xy], [yx, yy]] = blocks;
+    for of_axes in [[xx, yx], [xy, yy]] {
+        let columns = of_axes[0].ncols();
         let at = |unknown: usize| (unknown % 2, free[unknown / 2]);
         let mut moved = Mat::from_fn(2 * free.len(), columns, |unknown, column| {
             let (axis, row) = at(unknown);
-            blocks[axis][of_coefficients][(row, column)]
+            of_axes[axis][(row, column)]
         });
         factor.solve_in_place(&mut moved);
         for column in 0..columns {
             for unknown in 0..2 * free.len() {
                 let (axis, row) = at(unknown);
-                blocks[axis][of_coefficients][(row, column)] = moved[(unknown, column)];
+                of_axes[axis][(row, column)] = moved[(unknown, column)];
             }
         }
     }
