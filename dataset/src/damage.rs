@@ -56,7 +56,7 @@ mod tests {
         assert_eq!(warning(0.96, 0.019, Rigidity::Free), None);
         for (kept, change) in [(0.94, 0.0), (1.0, 0.021)] {
             let text = warning(kept, change, Rigidity::Rigid).unwrap();
-            assert!(text.contains("use -oo SHAPE=STIFF to keep them"), "{text}");
+            assert!(text.contains("use SHAPE=STIFF to keep them"), "{text}");
             let text = warning(kept, change, Rigidity::Stiff).unwrap();
             assert!(text.contains("lower AMPLITUDE to keep them"), "{text}");
         }
