@@ -12,6 +12,9 @@ use meshmark_core::agreement::Evidence;
 /// The subject of a verdict; a change to any of these makes another mark.
 const COPY: &str = "a copy of this recipient, made with this key, options and reference,";
 
+/// The amplitude of pilots may be larger than that of the mark by this many standard deviations.
+const AMPLITUDE_DEVIATIONS: f64 = 2.0;
+
 /// What a verdict on fingerprints rests on besides the standing of a recipient. All recipients
 /// share it.
 pub struct Grounds {
@@ -36,15 +39,17 @@ pub struct Answer {
 }
 
 impl Grounds {
-    /// Collects what a present mark would show. `pilot_amplitude` is that of the key's pilots, 1
-    /// for a mark of full amplitude; `tried` recipients share the `significance`.
+    /// Collects what a present mark would show. The amplitude of the key's pilots is 1 for a mark of
+    /// full amplitude, and as uncertain as their score allows; `tried` recipients share the
+    /// `significance`.
     pub fn new(
         evidence: &Evidence,
-        pilot_amplitude: f64,
+        (pilot_amplitude, pilot_score): (f64, f64),
         power: Power,
         (tried, significance): (usize, f64),
     ) -> Self {
-        let is_mixed = power == Power::KeyShows && evidence.fullness(pilot_amplitude) < LEAST_FULLNESS;
+        let least_amplitude = pilot_amplitude * (1.0 - AMPLITUDE_DEVIATIONS / pilot_score).max(0.0);
+        let is_mixed = power == Power::KeyShows && evidence.fullness(least_amplitude) < LEAST_FULLNESS;
         let expected = match power {
             Power::Unmoved => f64::INFINITY,
             Power::KeyShows => evidence.expected_score(pilot_amplitude),
@@ -145,10 +150,11 @@ mod tests {
     /// Returns the answer about the last of `tried` recipients.
     fn answer(estimates: &Estimates, power: Power, tried: &[&str]) -> Answer {
         let evidence = Evidence::of_recipients(estimates);
-        let pilot_amplitude = Evidence::of_pilots(estimates).amplitude(&pilots(&key(), &part()));
+        let (of_pilots, pilots) = (Evidence::of_pilots(estimates), pilots(&key(), &part()));
+        let seen = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
         let candidates: Vec<Sequence> = tried.iter().map(|name| signs(name)).collect();
         let standings = name_recipients(&evidence, &candidates, SIGNIFICANCE);
-        let grounds = Grounds::new(&evidence, pilot_amplitude, power, (tried.len(), SIGNIFICANCE));
+        let grounds = Grounds::new(&evidence, seen, power, (tried.len(), SIGNIFICANCE));
         grounds.decide(standings.last().unwrap())
     }
 
@@ -193,8 +199,9 @@ mod tests {
     #[test]
     fn weak_evidence_is_never_no_match() {
         let evidence = Evidence::of_recipients(&mean_of(&["A"], 0.95, 4));
-        let grounds =
-            |tried, significance| Grounds::new(&evidence, 1.0, Power::Trial(50.0), (tried, significance));
+        let grounds = |tried, significance| {
+            Grounds::new(&evidence, (1.0, 20.0), Power::Trial(50.0), (tried, significance))
+        };
         let standing = |score: f64, p_value_log10: f64| {
             let agreement = evidence.agreement(&signs("B"));
             Standing { agreement, score, round: 1, p_value_log10, is_named: false }

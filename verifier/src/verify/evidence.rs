@@ -118,9 +118,10 @@ fn of_fingerprints(
     let power =
         progress.listen(|listener| Power::of_fingerprint(matched, &seen, &pilots, parameters, listener))?;
     let standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
-    let pilot_amplitude = Evidence::of_pilots(&seen.estimates).amplitude(&pilots);
+    let of_pilots = Evidence::of_pilots(&seen.estimates);
+    let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
     let evidence = Evidence::of_recipients(&seen.estimates);
-    let grounds = Grounds::new(&evidence, pilot_amplitude, power, (tried, significance));
+    let grounds = Grounds::new(&evidence, of_pilots, power, (tried, significance));
     let decide = |standing: Standing| (standing, grounds.decide(&standing));
     let recipients = standings.into_iter().map(decide).collect();
     let pilots = seen.key_agreement(&pilots);
