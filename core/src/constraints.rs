@@ -1,5 +1,5 @@
-//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid or stiff, bodies.
-//! All of them are linear in the displacements and follow from the reference alone, so that the verifier
+//! Constraints on the displacements of vertices: T-junctions and, with SHAPE=rigid or stiff,
+//! bodies. All are linear in the displacements and follow from the reference alone: the verifier
 //! repeats them.
 
 use crate::{

@@ -77,8 +77,8 @@ impl Response {
     }
 
     /// Returns the response to basis functions (columns, n × k): free vertices follow them, stiff
-    /// ones with little change of angles and lengths; bodies follow by the nearest rigid motion, and hanging
-    /// vertices follow their anchors.
+    /// ones with little change of angles and lengths; bodies follow by the nearest rigid motion, and
+    /// hanging vertices follow their anchors.
     pub fn new(patch: &Patch, basis: Mat<f64>) -> Self {
         let mut response = match patch.bodies.is_empty() && patch.strains.is_empty() {
             true => Response::Separate(basis),

@@ -21,6 +21,9 @@ use faer::{
 const BEND_M: f64 = 20.0;
 /// The weight of a stretch, metres.
 const STRETCH_M: f64 = 50.0;
+/// Shorter segments have no direction: their weights would exceed all others beyond the last digit.
+const LEAST_LENGTH_M: f64 = 1e-3;
+
 /// The weighted changes of angles and lengths in a patch, as linear functions of displacements.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Strains {
@@ -111,8 +114,12 @@ impl Joints<'_> {
     fn add(&self, vertex: u32, strains: &mut Strains) {
         let [patch, _] = self.places[vertex as usize];
         let spokes = self.spokes(vertex);
-        let pairs = if spokes.len() == 2 { 1 } else { spokes.len() };
-        for (i, spoke) in spokes.iter().enumerate().take(if spokes.len() > 1 { pairs } else { 0 }) {
+        let pairs = match spokes.len() {
+            0 | 1 => 0,
+            2 => 1,
+            around => around,
+        };
+        for (i, spoke) in spokes.iter().enumerate().take(pairs) {
             let next = &spokes[(i + 1) % spokes.len()];
             if [spoke, next].iter().all(|spoke| !self.is_in_body(spoke.end)) {
                 let terms = [spoke.turn(vertex, 1.0), next.turn(vertex, -1.0)];
@@ -134,8 +141,9 @@ impl Joints<'_> {
         let spoke = |&end: &u32| {
             let [x, y] = self.map.ground.metres_between(self.map.at(vertex), self.map.at(end));
             let length_m = x.hypot(y);
-            // A hanging vertex may lie that far from its segment.
-            let has_direction = length_m > JUNCTION_M || ![vertex, end].iter().any(|&v| self.hangs(v));
+            // A hanging vertex may lie as far from its segment as this.
+            let hangs = [vertex, end].iter().any(|&v| self.hangs(v));
+            let has_direction = length_m >= if hangs { JUNCTION_M } else { LEAST_LENGTH_M };
             has_direction.then(|| Spoke { end, direction: [x / length_m, y / length_m], length_m })
         };
         let mut spokes: Vec<Spoke> = self.neighbours[vertex as usize].iter().filter_map(spoke).collect();
@@ -296,6 +304,28 @@ mod tests {
         let [free, rigid, stiff] = [Rigidity::Free, Rigidity::Rigid, Rigidity::Stiff].map(bent);
         assert!(rigid > 0.5 * free, "the rows are no bodies: {rigid} {free}");
         assert!(stiff < 0.2 && stiff < 0.3 * free, "{stiff} {free}");
+    }
+
+    #[test]
+    fn segments_without_a_length_do_not_count() {
+        // Lines of two vertices that nearly coincide, and one whose length is no normal number.
+        let line = |i: u32| {
+            let x = 10.0 * f64::from(i);
+            [[x, 0.0], [if i == 0 { 1e-310 } else { x * (1.0 + 1e-15) }, 0.0]]
+        };
+        let far = |i: u32| [[10.0 * f64::from(i), 50.0], [10.0 * f64::from(i) + 4.0, 57.0]];
+        let coords: Vec<[f64; 2]> = (0..100).flat_map(|i| [line(i), far(i)]).flatten().collect();
+        let starts: Vec<u32> = (0..coords.len() as u32).step_by(2).collect();
+        let kinds = vec![ChainKind::Line; starts.len()];
+        let town = MapData::from_chains(coords, &starts, kinds).unwrap().0;
+        let parameters = Parameters { patch_size: 100, ..Parameters::of_fingerprint() };
+        let patches = Patches::new(&on(&town), &parameters).unwrap();
+        for patch in patches.as_slice() {
+            let basis = Basis::low_frequencies(patch, 33).unwrap();
+            let response = Response::carriers(patch, &basis, &parameters);
+            let moved = response.synthesise(&[0, 1].map(|_| vec![0.1; 32]));
+            assert!(!patch.strains.is_empty() && moved.as_flattened().iter().all(|value| value.is_finite()));
+        }
     }
 
     #[test]

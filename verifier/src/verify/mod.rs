@@ -44,6 +44,7 @@ pub fn verify(requests: &[Request], references: &[PathBuf], progress: &mut Progr
         match verify_mark(request, references, progress) {
             Err(error) if requests.len() > 1 && is_unfit(&error) => unfit = unfit.or(Some(error)),
             Err(error) => return Err(error),
+            Ok(report) if report.verdict == Verdict::Match => return Ok(report),
             Ok(report) => {
                 best = Some(match best {
                     Some(best) => better(best, report),
@@ -59,16 +60,10 @@ fn is_unfit(error: &Error) -> bool {
     matches!(error, Error::Unfit { .. }) || error.is_about_options()
 }
 
-/// Returns the better of two reports on the same suspect: a match before a mark of the key without a
-/// match, and this before others. Of these an inconclusive one is the answer, as it cannot rule out
-/// its mark.
+/// Returns the better of two reports on the same suspect without a match: a mark of the key before
+/// others. Of these an inconclusive one is the answer, as it cannot rule out its mark.
 fn better(first: Report, second: Report) -> Report {
-    let rank = |report: &Report| match report.verdict {
-        Verdict::Match => 3,
-        _ if report.shows_key() => 2,
-        Verdict::Inconclusive => 1,
-        Verdict::NoMatch => 0,
-    };
+    let rank = |report: &Report| (report.shows_key(), report.verdict == Verdict::Inconclusive);
     if rank(&second) > rank(&first) { second } else { first }
 }
 
