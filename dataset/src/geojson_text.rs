@@ -39,18 +39,26 @@ pub fn places(text: &[u8]) -> Option<Vec<Place>> {
 /// for ordinates after the third. Where there was a bounding box, GDAL makes a new one. The result
 /// is `None` when nothing is left that GDAL would write.
 ///
+/// Numbers and booleans among the attributes stay where the layer `has_json_fields`: GDAL reads
+/// an attribute that is a number in one feature and a string in another as JSON text, and writes
+/// it as a number again where the native data has one (GDAL 3.9 and later).
+///
 /// ```
 /// # use meshmark_dataset::geojson_text::without_places;
 /// let feature = br#"{"type": "Feature", "id": 7, "bbox": [1, 2, 1, 2], "properties": {"a": 1},
 ///                    "geometry": {"type": "Point", "coordinates": [1, 2]}}"#;
-/// assert_eq!(without_places(feature).unwrap(), br#"{"id":7,"bbox":null,"properties":{}}"#);
+/// assert_eq!(without_places(feature, false).unwrap(), br#"{"id":7,"bbox":null,"properties":{}}"#);
 /// // What GDAL writes of itself needs no text.
-/// assert_eq!(without_places(br#"{"type": "Feature", "properties": {"a": 1}}"#), None);
+/// assert_eq!(without_places(br#"{"type": "Feature", "properties": {"a": 1}}"#, false), None);
 /// ```
-pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
+pub fn without_places(text: &[u8], has_json_fields: bool) -> Option<Vec<u8>> {
     let all = Text(text);
     let members = all.members(0..text.len())?;
-    let has_properties = members.iter().any(|(key, _)| *key == b"properties");
+    let properties = members.iter().find(|(key, _)| *key == b"properties").map(|(_, value)| value.clone());
+    let attributes = match &properties {
+        Some(properties) if has_json_fields => all.numbers_and_booleans(properties.clone()),
+        _ => Vec::new(),
+    };
     let mut kept = Vec::new();
     for (key, value) in members {
         let value = match key {
@@ -62,10 +70,10 @@ pub fn without_places(text: &[u8]) -> Option<Vec<u8>> {
         };
         kept.push([b"\"", key, b"\":", &value].concat());
     }
-    match has_properties {
-        true if kept.is_empty() => return None,
-        true => kept.push(b"\"properties\":{}".into()),
-        false => {} // GDAL writes none then
+    match properties {
+        Some(_) if kept.is_empty() && attributes.is_empty() => return None,
+        Some(_) => kept.push([b"\"properties\":{".as_slice(), &attributes.join(&b','), b"}"].concat()),
+        None => {} // GDAL writes none then
     }
     Some([b"{".as_slice(), &kept.join(&b','), b"}"].concat())
 }
@@ -117,6 +125,14 @@ impl<'a> Text<'a> {
             members.push((self.0.get(key.start + 1..key.end - 1)?, value));
         }
         Some(members)
+    }
+
+    /// Returns the members of an object that are numbers or booleans.
+    fn numbers_and_booleans(&self, object: Range<usize>) -> Vec<Vec<u8>> {
+        let is_kept = |value: &Range<usize>| !matches!(self.0[value.start], b'"' | b'{' | b'[' | b'n');
+        let members = self.members(object).unwrap_or_default().into_iter();
+        let kept = members.filter(|(_, value)| is_kept(value));
+        kept.map(|(key, value)| [b"\"", key, b"\":", &self.0[value]].concat()).collect()
     }
 
     /// Returns the values of an array.
@@ -260,7 +276,7 @@ mod tests {
     use super::*;
 
     fn kept(text: &str) -> Option<String> {
-        without_places(text.as_bytes()).map(|text| String::from_utf8(text).unwrap())
+        without_places(text.as_bytes(), false).map(|text| String::from_utf8(text).unwrap())
     }
 
     #[test]
@@ -295,6 +311,22 @@ mod tests {
         ];
         for (text, expected) in cases {
             assert_eq!(kept(text).as_deref(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_and_booleans_stay_for_fields_of_json() {
+        for (text, expected) in [
+            (
+                r#"{"properties":{"a\"": 1.50,"b":"x","c":true,"d":null,"e":[1],"f":{"g":2},"h":-0}}"#,
+                Some(r#"{"properties":{"a\"":1.50,"c":true,"h":-0}}"#),
+            ),
+            (r#"{"id":1,"properties":{"b":"x"}}"#, Some(r#"{"id":1,"properties":{}}"#)),
+            (r#"{"properties":{"b":"x"}}"#, None),
+            (r#"{"properties":null}"#, None),
+        ] {
+            let kept = without_places(text.as_bytes(), true);
+            assert_eq!(kept.map(|text| String::from_utf8(text).unwrap()).as_deref(), expected, "{text}");
         }
     }
 

@@ -6,7 +6,7 @@ use crate::{
     ffi_features::{Feature, FeatureRef},
     ffi_text::{c_string, strings, text},
 };
-use gdal_sys::OGRFeatureH;
+use gdal_sys::{OGRFeatureH, OGRFieldSubType};
 use meshmark_dataset::geojson_text::{MEDIA_TYPE, without_places};
 use std::{
     ffi::{CStr, CString, c_char},
@@ -23,7 +23,8 @@ pub fn item_without_places(name: &str, value: &str) -> Option<String> {
     if !name.eq_ignore_ascii_case(NATIVE_DATA) {
         return Some(value.into());
     }
-    without_places(value.as_bytes()).map(|kept| String::from_utf8(kept).expect("only ASCII was left out"))
+    without_places(value.as_bytes(), false)
+        .map(|kept| String::from_utf8(kept).expect("only ASCII was left out"))
 }
 
 impl FeatureRef<'_> {
@@ -38,9 +39,20 @@ impl FeatureRef<'_> {
             if data.is_null() || !text(kind).eq_ignore_ascii_case(MEDIA_TYPE) {
                 return None;
             }
-            without_places(CStr::from_ptr(data).to_bytes())?
+            without_places(CStr::from_ptr(data).to_bytes(), self.has_json_fields())?
         };
         Some(CString::new(data).expect("it was a C string"))
+    }
+
+    /// Returns whether a field of it holds JSON text.
+    fn has_json_fields(&self) -> bool {
+        // SAFETY: the feature is there, and has a field of every number below their count.
+        unsafe {
+            (0..gdal_sys::OGR_F_GetFieldCount(self.handle())).any(|number| {
+                let field = gdal_sys::OGR_F_GetFieldDefnRef(self.handle(), number);
+                gdal_sys::OGR_Fld_GetSubType(field) == OGRFieldSubType::OFSTJSON
+            })
+        }
     }
 }
 

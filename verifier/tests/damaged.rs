@@ -56,7 +56,13 @@ fn a_point_that_is_no_place_is_left_out_whatever_its_numbers_are() {
             .enumerate()
     {
         let suspect = in_degrees(&folder, &format!("{i}.geojson"), &feature("Point", place));
-        assert_match(&suspect, "left out:     1 coordinate pair of the suspect (layer \"buildings\"");
+        // GDAL 3.12 refuses a file with a number that no float can hold.
+        match Command::new("ogrinfo").arg("-so").arg(&suspect).status().unwrap().success() {
+            true => {
+                assert_match(&suspect, "left out:     1 coordinate pair of the suspect (layer \"buildings\"")
+            }
+            false => assert_answer(&suspect, 5, "Failed to read GeoJSON data"),
+        }
     }
 }
 

@@ -88,7 +88,7 @@ impl<'a> ForeignSearch<'a> {
 
     /// Adds a feature of a GeoJSON file.
     pub fn add(&mut self, feature: &[u8]) {
-        let foreign = without_places(feature).unwrap_or_default();
+        let foreign = without_places(feature, false).unwrap_or_default();
         self.found.add(&String::from_utf8_lossy(&foreign), &self.vertices);
     }
 

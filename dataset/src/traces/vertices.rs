@@ -56,7 +56,7 @@ impl<'a> Vertices<'a> {
         let table = &map.data.vertices;
         let (lower, upper) = table.bounds();
         let reach_m = REACH * amplitude_m;
-        let reach = map.ground()?.metres_per_unit(table.centre()).map(|unit_m| reach_m / unit_m);
+        let reach = map.measure()?.metres_per_unit(table.centre()).map(|unit_m| reach_m / unit_m);
         let [x, y] = [0, 1].map(|axis| lower[axis] - reach[axis]..=upper[axis] + reach[axis]);
         let mut frames = vec![Frame { x, y, to_map: None }];
         frames.extend(map.crs.as_ref().and_then(|crs| Frame::in_degrees(crs, (lower, upper))));

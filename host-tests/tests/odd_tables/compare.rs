@@ -15,7 +15,8 @@ const METRES_PER_DEGREE: f64 = 111_700.0;
 /// Returns the differences.
 pub fn files(host: &Host, format: &str, plain: &str, marked: &str) -> Option<String> {
     let attributes = match format {
-        "ESRI Shapefile" => companions(&host.path(plain), &host.path(marked)),
+        "ESRI Shapefile" => companions(&host.path(plain), &host.path(marked))
+            .or_else(|| first_difference(&dump(host, format, plain), &dump(host, format, marked))),
         "GeoJSON" | "GeoJSONSeq" => {
             first_difference(&without_places(host, plain), &without_places(host, marked))
         }
@@ -28,8 +29,23 @@ pub fn files(host: &Host, format: &str, plain: &str, marked: &str) -> Option<Str
 fn companions(plain: &Path, marked: &Path) -> Option<String> {
     let read = |path: &Path, ending: &str| fs::read(path.with_extension(ending)).ok();
     let differs = |ending: &&&str| read(plain, ending) != read(marked, ending);
-    let ending = ["dbf", "cpg", "prj"].iter().find(differs)?;
+    let endings = if adapts_widths() { &["cpg", "prj"][..] } else { &["dbf", "cpg", "prj"] };
+    let ending = endings.iter().find(differs)?;
     Some(format!("the .{ending} differs"))
+}
+
+/// Returns whether `ogr2ogr` adapts the widths of real numbers to the formats of source and target:
+/// docs/driver.md says by how much they then differ.
+fn adapts_widths() -> bool {
+    gdal::version::VersionInfo::version_num().parse::<u32>().unwrap() >= 3_070_000
+}
+
+/// Returns a line of `ogrinfo` without the width of a field of real numbers.
+fn without_real_width(line: &str) -> String {
+    match line.split_once(": Real (") {
+        Some((field, width)) if adapts_widths() && width.ends_with(')') => format!("{field}: Real"),
+        _ => line.into(),
+    }
 }
 
 /// Returns the text of a GeoJSON file with rounded numbers near the houses, which lie at longitude
@@ -57,10 +73,12 @@ fn without_places(host: &Host, file: &str) -> Vec<String> {
 /// place.
 fn dump(host: &Host, format: &str, file: &str) -> Vec<String> {
     let run = host.run("ogrinfo", &["-al", "-geom=NO", file]);
+    // The layer of a Shapefile has the name of its file.
+    let name = if format == "ESRI Shapefile" { "Layer name: " } else { "INFO: " };
     let is_ours = |line: &&str| {
-        !["INFO: ", "Extent: ", "      using driver"].iter().any(|start| line.starts_with(start))
+        !["INFO: ", "Extent: ", "      using driver", name].iter().any(|start| line.starts_with(start))
     };
-    let text = run.stdout.lines().filter(is_ours).collect::<Vec<_>>().join("\n");
+    let text = run.stdout.lines().filter(is_ours).map(without_real_width).collect::<Vec<_>>().join("\n");
     if format != "FlatGeobuf" {
         return text.lines().map(String::from).collect();
     }
@@ -78,13 +96,18 @@ fn first_difference(plain: &[String], marked: &[String]) -> Option<String> {
     }
     let pair = plain.iter().zip(marked).find(|(a, b)| a != b);
     Some(match pair {
-        Some((a, b)) => format!("{:?} is {:?}", cut(a), cut(b)),
+        Some((a, b)) => {
+            let [a, b] = where_they_differ(a, b);
+            format!("{a:?} is {b:?}")
+        }
         None => format!("{} lines are {}", plain.len(), marked.len()),
     })
 }
 
-fn cut(text: &str) -> String {
-    text.chars().take(300).collect()
+/// Returns the parts of two texts around their first difference.
+fn where_they_differ(a: &str, b: &str) -> [String; 2] {
+    let equal = a.chars().zip(b.chars()).take_while(|(a, b)| a == b).count();
+    [a, b].map(|text| text.chars().skip(equal.saturating_sub(60)).take(300).collect())
 }
 
 /// Compares values bit by bit, as far as the crate `gdal` reads them, and places.
@@ -99,13 +122,8 @@ fn geometries(format: &str, plain: &Path, marked: &Path) -> Option<String> {
         }
         for (a, b) in before.features.iter().zip(&after.features) {
             if (a.fid, &a.attributes) != (b.fid, &b.attributes) {
-                return Some(format!(
-                    "{:?} {} is {:?} {}",
-                    a.fid,
-                    cut(&a.attributes),
-                    b.fid,
-                    cut(&b.attributes)
-                ));
+                let [had, has] = where_they_differ(&a.attributes, &b.attributes);
+                return Some(format!("{:?} {had} is {:?} {has}", a.fid, b.fid));
             }
             let [from, to] = [a, b].map(|feature| {
                 feature

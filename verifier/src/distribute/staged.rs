@@ -105,7 +105,7 @@ fn clear_native_data(path: &Path) -> Done<()> {
         let Some((before, rest)) = text.split_once(BEGIN) else { continue };
         let (words, after) = rest.split_once(END).unwrap_or((rest, ""));
         let words = ESCAPES.iter().fold(words.to_string(), |words, (name, sign)| words.replace(name, sign));
-        let kept = String::from_utf8(without_places(words.as_bytes()).unwrap_or_default())?;
+        let kept = String::from_utf8(without_places(words.as_bytes(), false).unwrap_or_default())?;
         let kept = ESCAPES.iter().rev().fold(kept, |kept, (name, sign)| kept.replace(sign, name));
         let update = "UPDATE gpkg_metadata SET metadata = ?2 WHERE id = ?1";
         connection.execute(update, (id, format!("{before}{BEGIN}{kept}{END}{after}")))?;
