@@ -81,7 +81,7 @@ fn matching(criterion: &mut Criterion) {
         [p[0] + 0.3 * angle.cos(), p[1] + 0.3 * angle.sin()]
     };
     let moved: Vec<[f64; 2]> = points.iter().enumerate().map(shift).collect();
-    let ground = Ground::Plane { metres_per_unit: 1.0 };
+    let ground = Ground::METRES;
     let mut group = criterion.benchmark_group("matching");
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let ours = || one_thread.install(|| Matcher::new(&points, &ground, [0.0, 0.0]).all(&moved, RADIUS_M));
@@ -111,7 +111,7 @@ fn points() -> Vec<[f64; 2]> {
 fn first_patch(patch_size: usize) -> Patch {
     let survey = survey_of(MAP);
     let parameters = Parameters { patch_size, ..Parameters::default() };
-    let map = survey.map().expect("with metres");
+    let map = survey.map(&parameters).expect("with metres");
     let patches = Patches::new(&map, &parameters).expect("of enough vertices");
     patches.as_slice()[0].clone()
 }

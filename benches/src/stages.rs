@@ -43,13 +43,13 @@ impl Stages {
         let parameters = Parameters::default();
         let (key, message) = (SecretKey::from_bytes([7; 32]), Message::from_bytes(&[0xa5; 16]));
         let (read_s, map) = best_of_two(|| read(path))?;
-        let (cut_s, patches) = best_of_two(|| Ok(Patches::new(&map.map()?, &parameters)?))?;
+        let (cut_s, patches) = best_of_two(|| Ok(Patches::new(&map.map(&parameters)?, &parameters)?))?;
         let columns = patches.carriers(message.len(), &parameters)? + 1;
         let step = patches.as_slice().len().div_ceil(SOLVED);
         let some: Vec<&Patch> = patches.as_slice().iter().step_by(step).collect();
         let [one_s, two_s] = [1, 2].map(|threads| solve_all(&some, columns, threads));
         let (one_s, two_s) = (one_s?, two_s?);
-        let (embed_s, _) = best_of_two(|| Ok(embed(&map.map()?, &key, &message, &parameters)?))?;
+        let (embed_s, _) = best_of_two(|| Ok(embed(&map.map(&parameters)?, &key, &message, &parameters)?))?;
         Ok(Stages {
             vertices: map.data.vertices.len(),
             patches: patches.as_slice().len(),

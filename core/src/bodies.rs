@@ -145,9 +145,9 @@ mod tests {
     fn bodies(polygon_roots: &[u32], touching: &[(u32, [u32; 2])]) -> Vec<Vec<u32>> {
         let coords = (0..polygon_roots.len()).map(|i| [i as f64, (i * i) as f64]).collect();
         let vertices = VertexTable::new(coords).unwrap();
-        let ground = Ground::Plane { metres_per_unit: 1.0 };
+        let ground = Ground::METRES;
         let map =
-            Map { vertices: &vertices, segments: &[], polygon_roots, ..Map::of_points(&vertices, ground) };
+            Map { vertices: &vertices, segments: &[], polygon_roots, ..Map::of_points(&vertices, &ground) };
         let found = Bodies::find(&map, touching.iter().copied());
         found.as_slice().iter().map(|body| body.members.clone()).collect()
     }

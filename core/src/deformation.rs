@@ -346,7 +346,7 @@ mod tests {
         let coords = (0..600).map(|i| [hash(i) as f64 / 1e3, hash(i + 7777) as f64 / 1e3]).collect();
         let table = VertexTable::new(coords).unwrap();
         let parameters = Parameters { patch_size: 300, ..Parameters::default() };
-        Patches::new(&Map::of_points(&table, Ground::Plane { metres_per_unit: 1.0 }), &parameters).unwrap()
+        Patches::new(&Map::of_points(&table, &Ground::METRES), &parameters).unwrap()
     }
 
     fn wave([x, y]: [f64; 2]) -> [f64; 2] {
@@ -427,7 +427,7 @@ mod tests {
         let starts: Vec<u32> = (0..750).step_by(5).collect();
         let (town, _) = MapData::from_chains(coords, &starts, vec![ChainKind::Shell; 150]).unwrap();
         let patches = Patches::new(
-            &town.on(Ground::Plane { metres_per_unit: 1.0 }, None),
+            &town.on(&Ground::METRES, &Ground::METRES),
             &Parameters { patch_size: 300, ..Parameters::default() },
         )
         .unwrap();

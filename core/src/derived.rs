@@ -201,7 +201,7 @@ mod tests {
     }
 
     fn on(town: &MapData) -> Map<'_> {
-        town.on(Ground::Plane { metres_per_unit: 1.0 }, None)
+        town.on(&Ground::METRES, &Ground::METRES)
     }
 
     /// Returns the means of the vertices of houses as points.

@@ -1,6 +1,6 @@
 //! The effect of marking on a map, in figures.
 
-use crate::{map::Map, scale::Measure, vertices::VertexTable};
+use crate::{ground::Ground, map::Map, vertices::VertexTable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -98,7 +98,7 @@ pub struct Displacement {
 
 impl Displacement {
     /// Measures the displacement of the vertices of a map to `moved`, in canonical order.
-    pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], measure: &Measure) -> Self {
+    pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], measure: &Ground) -> Self {
         let metres = |(from, to): (&[f64; 2], &[f64; 2])| {
             let [dx, dy] = measure.metres_between(*from, *to);
             dx.hypot(dy)
@@ -161,7 +161,7 @@ impl Corner {
         let pairs: Vec<&[[u32; 2]]> = ends.chunk_by(|a, b| a[0] == b[0]).filter(|c| c.len() == 2).collect();
         let corner = |pair: &&[[u32; 2]]| {
             let [from, at, to] = [pair[0][1], pair[0][0], pair[1][1]];
-            let scale = map.measure().metres_per_unit(map.at(at));
+            let scale = map.measure.metres_per_unit(map.at(at));
             let angle = |coords: &[[f64; 2]]| {
                 let [from, at, to] = [from, at, to].map(|v| coords[v as usize]);
                 angle_deg(from, at, to, scale)
@@ -192,7 +192,6 @@ fn angle_deg(from: [f64; 2], at: [f64; 2], to: [f64; 2], scale: [f64; 2]) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ground::Ground;
 
     #[test]
     fn a_corner_has_two_segments_and_is_measured_on_the_ground() {
@@ -200,8 +199,8 @@ mod tests {
         let coords = vec![[0.0, 0.0], [0.0, 4.0], [2.0, 0.0], [2.0, 4.0], [3.0, 4.0], [3.0, 5.0]];
         let vertices = VertexTable::new(coords.clone()).unwrap();
         let segments = [[0, 1], [0, 2], [2, 3], [3, 4], [3, 5]];
-        let ground = Ground::Plane { metres_per_unit: 1.0 };
-        let map = Map { segments: &segments, ..Map::of_points(&vertices, ground) };
+        let ground = Ground::METRES;
+        let map = Map { segments: &segments, ..Map::of_points(&vertices, &ground) };
         let still = AngleChange::at(&Corner::all(&map, &coords));
         assert_eq!((still.count, still.right_angles, still.right_angles_kept), (2, 2, 1.0));
         assert_eq!((still.mean_change_deg, still.p99_change_deg), (0.0, 0.0));

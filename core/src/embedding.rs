@@ -249,7 +249,7 @@ impl<'a> Groundwork<'a> {
     pub fn marked(&self, settled: Settled) -> Marked {
         let Groundwork { map, patches, .. } = self;
         Marked {
-            displacement: Displacement::between(map.vertices, &settled.coords, &map.measure()),
+            displacement: Displacement::between(map.vertices, &settled.coords, map.measure),
             angles: AngleChange::at(&Corner::all(map, &settled.coords)),
             coords: settled.coords,
             patches: patches.as_slice().len(),

@@ -41,7 +41,8 @@ pub struct FingerprintRecord {
     pub copy: CopyEntry,
     /// The parts of the map, each with signs of its own.
     pub parts: Vec<PartEntry>,
-    /// What marking did to the map.
+    /// What marking did to the map, by the names of version 1.
+    #[serde(flatten)]
     pub distortion: Distortion,
 }
 
@@ -257,7 +258,7 @@ mod tests {
     fn later_versions_may_add_fields_but_none_that_shapes_the_mark() {
         let signed = FingerprintRecord::from_json(&changed("/signature", json!({ "ed25519": "00" })));
         assert_eq!(signed.unwrap(), record());
-        for pointer in ["/mark/twist", "/parts/0/offset", "/reference/edition", "/distortion/colour"] {
+        for pointer in ["/mark/twist", "/parts/0/offset", "/reference/edition", "/topology/colour"] {
             let error = FingerprintRecord::from_json(&changed(pointer, json!(1))).unwrap_err().to_string();
             assert!(error.contains("unknown field"), "{pointer}: {error}");
         }

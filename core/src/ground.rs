@@ -1,13 +1,18 @@
 //! Metres on the ground: the size of a CRS unit at a place of the map.
 
+use crate::scale::ScaleLattice;
+use std::sync::Arc;
+
 /// The size of a CRS unit on the ground.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Ground {
     /// A projected CRS, or none: the size is the same everywhere and measured at the map's centre.
     Plane {
         /// Metres on the ground per CRS unit.
         metres_per_unit: f64,
     },
+    /// A projected CRS whose units differ over the map: the size is measured at many places.
+    Uneven(Arc<ScaleLattice>),
     /// A geographic CRS: x is longitude, y is latitude.
     Ellipsoid {
         /// Semi-major axis, metres.
@@ -20,6 +25,9 @@ pub enum Ground {
 }
 
 impl Ground {
+    /// A plane in metres.
+    pub const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
+
     /// WGS 84 in degrees.
     pub const WGS84: Ground = Ground::Ellipsoid {
         semi_major_m: 6_378_137.0,
@@ -31,9 +39,10 @@ impl Ground {
     /// radii of curvature of the parallel (N cos φ) and of the meridian (M) (Snyder, *Map
     /// Projections*, 1987, eq. 4-18 to 4-20).
     pub fn metres_per_unit(&self, point: [f64; 2]) -> [f64; 2] {
-        match *self {
-            Ground::Plane { metres_per_unit } => [metres_per_unit; 2],
-            Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } => {
+        match self {
+            &Ground::Plane { metres_per_unit } => [metres_per_unit; 2],
+            Ground::Uneven(lattice) => lattice.metres_per_unit(point),
+            &Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } => {
                 let (sin, cos) = (point[1] * radians_per_unit).sin_cos();
                 let e2 = 1.0 - (b / a).powi(2);
                 let w2 = 1.0 - e2 * sin * sin;
@@ -45,7 +54,7 @@ impl Ground {
     }
 
     /// Returns the geocentric coordinates of a point of the ellipsoid, metres (EPSG method 9602);
-    /// `None` in a plane. Unlike degrees, they are continuous across the 180th meridian and at the
+    /// `None` in a projected CRS. Unlike degrees, they are continuous across the 180th meridian and at the
     /// poles.
     pub fn in_space(&self, point: [f64; 2]) -> Option<[f64; 3]> {
         let Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } = *self else {
@@ -78,7 +87,7 @@ impl Ground {
     /// the same numbers.
     pub fn x_scale(&self, middle_y: f64) -> f64 {
         match self {
-            Ground::Plane { .. } => 1.0,
+            Ground::Plane { .. } | Ground::Uneven(_) => 1.0,
             Ground::Ellipsoid { radians_per_unit, .. } => {
                 let steps = 2f64.powi(20);
                 ((middle_y * radians_per_unit).cos().abs() * steps).round().max(1.0) / steps

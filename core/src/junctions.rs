@@ -160,8 +160,8 @@ mod tests {
     fn junctions(points: &[[f64; 2]], segments: &[[u32; 2]]) -> Vec<Hanging> {
         let vertices = VertexTable::new(points.to_vec()).unwrap();
         assert_eq!(vertices.coords(), points);
-        let ground = Ground::Plane { metres_per_unit: 1.0 };
-        let map = Map { segments, ..Map::of_points(&vertices, ground) };
+        let ground = Ground::METRES;
+        let map = Map { segments, ..Map::of_points(&vertices, &ground) };
         Junctions::new(touches(&map, &VertexTree::of_all(&map))).hanging
     }
 

@@ -15,7 +15,7 @@
 //! let jitter = |i: usize| (i * 7919 % 101) as f64 / 40.0;
 //! let coords = (0..900).map(|i| [(i % 30 * 10) as f64 + jitter(i), (i / 30 * 10) as f64 + jitter(i + 1)]);
 //! let table = VertexTable::new(coords.collect())?;
-//! let map = Map::of_points(&table, Ground::Plane { metres_per_unit: 1.0 });
+//! let map = Map::of_points(&table, &Ground::METRES);
 //! let key = SecretKey::from_bytes([7; 32]);
 //! let message = Message::from_hex("00112233445566778899aabbccddeeff")?;
 //! let parameters = Parameters::default();

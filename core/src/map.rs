@@ -1,10 +1,6 @@
 //! The map that the algorithm works on.
 
-use crate::{
-    ground::Ground,
-    scale::{Measure, ScaleLattice},
-    vertices::VertexTable,
-};
+use crate::{ground::Ground, vertices::VertexTable};
 
 /// Vertices, the segments and polygons that join them, and the size of a unit.
 #[derive(Debug, Clone, Copy)]
@@ -17,21 +13,16 @@ pub struct Map<'a> {
     /// For every vertex the first vertex of its polygon group (polygons joined by shared vertices);
     /// the vertex itself when it is in none.
     pub polygon_roots: &'a [u32],
-    /// Metres on the ground by the one scale of the mark.
-    pub ground: Ground,
-    /// Metres on the ground at each vertex, where that scale is not exact.
-    pub lattice: Option<&'a ScaleLattice>,
+    /// Metres of the mark: version 1 has one scale for a projected map.
+    pub ground: &'a Ground,
+    /// Metres on the ground at each vertex, for limits and figures.
+    pub measure: &'a Ground,
 }
 
 impl<'a> Map<'a> {
     /// Creates a map of points alone.
-    pub fn of_points(vertices: &'a VertexTable, ground: Ground) -> Self {
-        Map { vertices, segments: &[], polygon_roots: &[], ground, lattice: None }
-    }
-
-    /// Returns the measure of metres at each vertex.
-    pub fn measure(&self) -> Measure<'a> {
-        Measure { ground: self.ground, lattice: self.lattice }
+    pub fn of_points(vertices: &'a VertexTable, ground: &'a Ground) -> Self {
+        Map { vertices, segments: &[], polygon_roots: &[], ground, measure: ground }
     }
 
     /// Returns the coordinates of a vertex, CRS units.

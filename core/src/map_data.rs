@@ -3,8 +3,7 @@
 pub use crate::areas::ChainKind;
 
 use crate::{
-    Error, Result, areas::Areas, disjoint_sets::DisjointSets, ground::Ground, map::Map, scale::ScaleLattice,
-    vertices::VertexTable,
+    Error, Result, areas::Areas, disjoint_sets::DisjointSets, ground::Ground, map::Map, vertices::VertexTable,
 };
 
 /// A map without its file.
@@ -121,10 +120,11 @@ impl MapData {
         Ok(MapData { vertices, segments, polygon_roots: joined.roots(), areas, labels, polylines })
     }
 
-    /// Returns the map as input of the algorithm.
-    pub fn on<'a>(&'a self, ground: Ground, lattice: Option<&'a ScaleLattice>) -> Map<'a> {
+    /// Returns the map as input of the algorithm; `ground` has the metres of the mark, `measure`
+    /// those of limits and figures.
+    pub fn on<'a>(&'a self, ground: &'a Ground, measure: &'a Ground) -> Map<'a> {
         let MapData { vertices, segments, polygon_roots, .. } = self;
-        Map { vertices, segments, polygon_roots, ground, lattice }
+        Map { vertices, segments, polygon_roots, ground, measure }
     }
 }
 

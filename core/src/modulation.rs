@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn a_mark_moves_vertices_as_its_modulation_does() {
         let town = town();
-        let map = town.on(Ground::Plane { metres_per_unit: 1.0 }, None);
+        let map = town.on(&Ground::METRES, &Ground::METRES);
         let (key, message) = (SecretKey::from_bytes([4; 32]), Message::from_bytes(&[0x5a; 16]));
         // A body turns by an angle, which the response takes as its sine.
         for (shape, most_m) in [(Rigidity::Free, 1e-9), (Rigidity::Rigid, 5e-3), (Rigidity::Stiff, 5e-3)] {

@@ -443,8 +443,6 @@ mod tests {
     use super::*;
     use crate::{code::Code, ground::Ground, vertices::VertexTable};
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     fn scattered(n: u64) -> VertexTable {
         let hash = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31) % 1_000_003;
         let coords = (0..n).map(|i| [hash(i) as f64, hash(i + n) as f64]).collect();
@@ -458,7 +456,7 @@ mod tests {
     #[test]
     fn every_patch_has_nearly_patch_size_vertices() {
         for (n, d, patches) in [(5000, 480, 10), (959, 480, 1), (960, 480, 2), (4000, 100, 40)] {
-            let cut = Patches::new(&Map::of_points(&scattered(n), METRES), &size(d)).unwrap();
+            let cut = Patches::new(&Map::of_points(&scattered(n), &Ground::METRES), &size(d)).unwrap();
             cut.validate().unwrap();
             assert_eq!(cut.as_slice().len(), patches);
             for patch in cut.as_slice() {
@@ -469,14 +467,14 @@ mod tests {
 
     #[test]
     fn too_few_vertices_name_the_size_that_fits() {
-        let error = Patches::new(&Map::of_points(&scattered(300), METRES), &size(480)).unwrap_err();
+        let error = Patches::new(&Map::of_points(&scattered(300), &Ground::METRES), &size(480)).unwrap_err();
         assert!(error.to_string().contains("300 distinct vertices"), "{error}");
         assert!(error.to_string().contains("use PATCH_SIZE=300"), "{error}");
     }
 
     #[test]
     fn capacity_counts_the_mean_as_taken() {
-        let cut = Patches::new(&Map::of_points(&scattered(600), METRES), &size(300)).unwrap();
+        let cut = Patches::new(&Map::of_points(&scattered(600), &Ground::METRES), &size(300)).unwrap();
         let p = Parameters { code: Code::Repetition, chip_rate: 1, ..Parameters::default() };
         assert_eq!(cut.carriers(299, &p).unwrap(), 299);
         assert!(cut.carriers(300, &p).unwrap_err().to_string().contains("has 299"));

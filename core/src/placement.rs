@@ -1,12 +1,12 @@
 //! The final place of a vertex: within the tolerance, on the output grid, and away from the edges
 //! of the world.
 
-use crate::{Error, Result, map::Map, options::Parameters, scale::Measure};
+use crate::{Error, Result, ground::Ground, map::Map, options::Parameters};
 
 /// The limits of a displacement.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placement<'a> {
-    measure: Measure<'a>,
+    measure: &'a Ground,
     tolerance_m: f64,
     precision: Option<f64>,
 }
@@ -17,7 +17,7 @@ impl<'a> Placement<'a> {
     pub fn new(map: &Map<'a>, parameters: &Parameters) -> Result<Self> {
         check_precision(map, parameters)?;
         let Parameters { tolerance_m, precision_crs_units: precision, .. } = *parameters;
-        Ok(Placement { measure: map.measure(), tolerance_m, precision })
+        Ok(Placement { measure: map.measure, tolerance_m, precision })
     }
 
     /// Returns the place of a vertex at `from` that should move by `wanted`, CRS units.
@@ -51,7 +51,7 @@ impl<'a> Placement<'a> {
 
     /// Returns whether a vertex must stay in place.
     pub fn is_pinned(&self, from: [f64; 2]) -> bool {
-        self.measure.ground.is_pinned(from, self.tolerance_m)
+        self.measure.is_pinned(from, self.tolerance_m)
     }
 
     /// Returns the furthest that a vertex near `at` may move, metres of a `scale` in metres per
@@ -107,7 +107,7 @@ fn check_precision(map: &Map, parameters: &Parameters) -> Result<()> {
     let (min, max) = map.vertices.bounds();
     // A degree of longitude is longest where the map comes nearest to the equator.
     let widest_y = if min[1] <= 0.0 && max[1] >= 0.0 { 0.0 } else { min[1].abs().min(max[1].abs()) };
-    let scale = [min[1], max[1], widest_y].map(|y| map.measure().metres_per_unit([min[0], y]));
+    let scale = [min[1], max[1], widest_y].map(|y| map.measure.metres_per_unit([min[0], y]));
     let metres = precision * scale.iter().flatten().fold(0f64, |a, &b| a.max(b));
     if metres > parameters.tolerance_m {
         return Err(Error::PrecisionTooCoarse { precision, metres, tolerance_m: parameters.tolerance_m });

@@ -58,7 +58,6 @@ pub struct Record {
 
 /// The distortion of a map by marking.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 #[allow(missing_docs)] // the names are those of the record
 pub struct Distortion {
     pub displacement: Displacement,

@@ -1,11 +1,10 @@
 //! The scale at each vertex: metres on the ground per CRS unit, which vary over the map of a
 //! projected CRS.
 //!
-//! The mark itself has one scale for the whole map, [`Ground::Plane`]; version 1 of the mark fixes
-//! it. TOLERANCE and the figures of records and comparisons are measured by the scale of this
-//! module.
+//! Version 1 of the mark has one scale for the whole map. Version 2, TOLERANCE, and the figures of
+//! records and comparisons are measured by the scale of this module.
 
-use crate::{ground::Ground, vertices::VertexTable};
+use crate::vertices::VertexTable;
 
 /// A mark with one scale is legal where its error is at most this share at every vertex.
 const MOST_OFF: f64 = 0.05;
@@ -32,9 +31,9 @@ impl Scale {
     }
 
     /// Returns a weighted mean of scales; the weights add up to 1.
-    fn mean(weighted: &[(f64, Scale)]) -> Self {
+    fn mean(weighted: impl Iterator<Item = (f64, Scale)> + Clone) -> Self {
         let mean = |value: fn(&Scale) -> [f64; 2]| {
-            [0, 1].map(|i| weighted.iter().map(|(weight, scale)| weight * value(scale)[i]).sum())
+            [0, 1].map(|i| weighted.clone().map(|(weight, scale)| weight * value(&scale)[i]).sum())
         };
         Scale { metres_per_unit: mean(|s| s.metres_per_unit), extremes: mean(|s| s.extremes) }
     }
@@ -46,8 +45,10 @@ impl Scale {
 }
 
 /// Scales on a lattice over a map, between which they are interpolated.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ScaleLattice {
+    /// The scale at the middle of the map, for places outside the projection.
+    middle_metres_per_unit: f64,
     lower: [f64; 2],
     /// The sides of a cell, CRS units.
     cell: [f64; 2],
@@ -66,7 +67,7 @@ impl ScaleLattice {
         negligible: f64,
         scales_at: impl Fn(&[[f64; 2]]) -> Vec<Option<Scale>>,
     ) -> Option<Self> {
-        let lattice = |nodes_per_side| Self::sample(vertices.bounds(), nodes_per_side, &scales_at);
+        let lattice = |nodes| Self::sample(vertices.bounds(), metres_per_unit, nodes, &scales_at);
         let is_even =
             |scale: &Option<Scale>| scale.is_some_and(|scale| scale.off(metres_per_unit) < negligible);
         let needs_none = vertices.is_empty() || lattice(COARSE).nodes.iter().all(is_even);
@@ -75,6 +76,7 @@ impl ScaleLattice {
 
     fn sample(
         (lower, upper): ([f64; 2], [f64; 2]),
+        middle_metres_per_unit: f64,
         nodes_per_side: usize,
         scales_at: &impl Fn(&[[f64; 2]]) -> Vec<Option<Scale>>,
     ) -> Self {
@@ -83,12 +85,12 @@ impl ScaleLattice {
         let at = |axis: usize, step: usize| lower[axis] + cell[axis] * step as f64;
         let row = |y: usize| (0..nodes_per_side).map(move |x| [at(0, x), at(1, y)]);
         let places: Vec<[f64; 2]> = (0..nodes_per_side).flat_map(row).collect();
-        ScaleLattice { lower, cell, nodes_per_side, nodes: scales_at(&places) }
+        ScaleLattice { middle_metres_per_unit, lower, cell, nodes_per_side, nodes: scales_at(&places) }
     }
 
     /// Interpolates the scale at a point from the corners of its cell that have one; `None` where
     /// none of them has.
-    pub fn at(&self, point: [f64; 2]) -> Option<Scale> {
+    fn at(&self, point: [f64; 2]) -> Option<Scale> {
         let last = self.nodes_per_side - 2;
         let place = |axis: usize| {
             let steps = (point[axis] - self.lower[axis]) / self.cell[axis];
@@ -99,13 +101,28 @@ impl ScaleLattice {
         let ((x, u), (y, v)) = (place(0), place(1));
         let corner = |dx: usize, dy: usize| {
             let weight = if dx == 1 { u } else { 1.0 - u } * if dy == 1 { v } else { 1.0 - v };
-            self.nodes[(y + dy) * self.nodes_per_side + x + dx].map(|scale| (weight, scale))
+            (weight, self.nodes[(y + dy) * self.nodes_per_side + x + dx])
         };
-        let mut corners: Vec<(f64, Scale)> =
-            [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)].into_iter().flatten().collect();
-        let whole: f64 = corners.iter().map(|(weight, _)| weight).sum();
-        corners.iter_mut().for_each(|(weight, _)| *weight /= whole);
-        (whole > 0.0).then(|| Scale::mean(&corners))
+        let corners = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
+        let there = || corners.iter().filter_map(|(weight, scale)| Some((*weight, (*scale)?)));
+        let whole: f64 = there().map(|(weight, _)| weight).sum();
+        (whole > 0.0).then(|| Scale::mean(there().map(|(weight, scale)| (weight / whole, scale))))
+    }
+
+    /// Returns metres per CRS unit along x and y at a point.
+    pub fn metres_per_unit(&self, point: [f64; 2]) -> [f64; 2] {
+        self.at(point).map_or([self.middle_metres_per_unit; 2], |scale| scale.metres_per_unit)
+    }
+
+    /// Returns the largest share by which the scale at the middle of the map is wrong at a vertex,
+    /// where it is more than version 1 of the mark allows, and the two vertices where a unit is the
+    /// shortest and the longest.
+    pub fn unevenness(&self, vertices: &VertexTable) -> Option<(f64, [[f64; 2]; 2])> {
+        let scales = || vertices.coords().iter().filter_map(|&at| Some((at, self.at(at)?)));
+        let off = scales().map(|(_, scale)| scale.off(self.middle_metres_per_unit)).fold(0.0, f64::max);
+        let (shortest, _) = scales().min_by(|(_, a), (_, b)| a.extremes[0].total_cmp(&b.extremes[0]))?;
+        let (longest, _) = scales().max_by(|(_, a), (_, b)| a.extremes[1].total_cmp(&b.extremes[1]))?;
+        (off > MOST_OFF).then_some((off, [shortest, longest]))
     }
 }
 
@@ -113,43 +130,6 @@ impl ScaleLattice {
 const COARSE: usize = 5;
 /// Nodes per side. Over a whole EPSG:3857 map up to 89.99° the interpolated scale is within 0.3 %.
 const FINE: usize = 65;
-
-/// The measure of metres on the ground at a point.
-#[derive(Debug, Clone, Copy)]
-pub struct Measure<'a> {
-    /// The scale of the mark, or that of the ellipsoid, for maps where it is exact.
-    pub ground: Ground,
-    /// The lattice, for maps where it is not.
-    pub lattice: Option<&'a ScaleLattice>,
-}
-
-impl Measure<'_> {
-    /// Returns metres per CRS unit along x and y at a point.
-    pub fn metres_per_unit(&self, point: [f64; 2]) -> [f64; 2] {
-        let scale = self.lattice.and_then(|lattice| lattice.at(point));
-        scale.map_or_else(|| self.ground.metres_per_unit(point), |scale| scale.metres_per_unit)
-    }
-
-    /// Returns the vector from `a` to `b` (CRS units) in metres, measured at `a`.
-    pub fn metres_between(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-        let [mx, my] = self.metres_per_unit(a);
-        [(b[0] - a[0]) * mx, (b[1] - a[1]) * my]
-    }
-
-    /// The largest share by which the one scale of the mark is wrong at a vertex, where it is more
-    /// than version 1 of the mark allows, and the two vertices where a unit is the shortest and the
-    /// longest.
-    pub fn unevenness(&self, vertices: &VertexTable) -> Option<(f64, [[f64; 2]; 2])> {
-        let (Some(lattice), Ground::Plane { metres_per_unit }) = (self.lattice, self.ground) else {
-            return None;
-        };
-        let scales = || vertices.coords().iter().filter_map(|&at| Some((at, lattice.at(at)?)));
-        let off = scales().map(|(_, scale)| scale.off(metres_per_unit)).fold(0.0, f64::max);
-        let (shortest, _) = scales().min_by(|(_, a), (_, b)| a.extremes[0].total_cmp(&b.extremes[0]))?;
-        let (longest, _) = scales().max_by(|(_, a), (_, b)| a.extremes[1].total_cmp(&b.extremes[1]))?;
-        (off > MOST_OFF).then_some((off, [shortest, longest]))
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -180,8 +160,7 @@ mod tests {
             let [found, exact] = [found, exact].map(|scale| scale.metres_per_unit[0]);
             assert!((found / exact - 1.0).abs() < 3e-3, "{y}: {found} {exact}");
         }
-        let measure = Measure { ground: Ground::Plane { metres_per_unit: one }, lattice: Some(&lattice) };
-        let (off, [shortest, longest]) = measure.unevenness(&world).unwrap();
+        let (off, [shortest, longest]) = lattice.unevenness(&world).unwrap();
         let away = |place: [f64; 2]| place[1].abs();
         let ends = world
             .coords()
@@ -205,10 +184,9 @@ mod tests {
         let vertices = VertexTable::new(vec![[0.0, 0.0], [10.0, 10.0]]).unwrap();
         let half = |p: &[f64; 2]| (p[0] < 5.1).then(|| Scale::new([2.0, 0.0, 0.0], [0.0, 2.0, 0.0]));
         let lattice =
-            ScaleLattice::measure(&vertices, 2.0, 1e-3, |at| at.iter().map(half).collect()).unwrap();
-        assert_eq!(lattice.at([1.0, 1.0]).unwrap().metres_per_unit, [2.0, 2.0]);
+            ScaleLattice::measure(&vertices, 3.0, 1e-3, |at| at.iter().map(half).collect()).unwrap();
+        assert_eq!(lattice.metres_per_unit([1.0, 1.0]), [2.0, 2.0]);
         assert_eq!(lattice.at([9.0, 1.0]), None);
-        let measure = Measure { ground: Ground::Plane { metres_per_unit: 3.0 }, lattice: Some(&lattice) };
-        assert_eq!(measure.metres_per_unit([9.0, 1.0]), [3.0, 3.0]);
+        assert_eq!(lattice.metres_per_unit([9.0, 1.0]), [3.0, 3.0]);
     }
 }

@@ -267,7 +267,7 @@ mod tests {
     }
 
     fn on(town: &MapData) -> Map<'_> {
-        town.on(Ground::Plane { metres_per_unit: 1.0 }, None)
+        town.on(&Ground::METRES, &Ground::METRES)
     }
 
     /// Returns the marked map by one pattern of signs, and its root mean square displacement.

@@ -20,7 +20,6 @@ use meshmark_core::{
     signs::Signs,
 };
 
-const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 const COEFFICIENTS: usize = fingerprint::COEFFICIENTS;
 
 fn key() -> SecretKey {
@@ -56,7 +55,7 @@ fn agreement(town: &MapData, seen: &Estimates, recipient: &str) -> Agreement {
 #[test]
 fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_in_every_shape() {
     let town = town();
-    let map = town.on(METRES, None);
+    let map = town.on(&Ground::METRES, &Ground::METRES);
     for shape in [Rigidity::Free, Rigidity::Rigid, Rigidity::Stiff] {
         let parameters = Parameters { shape, ..Parameters::of_fingerprint() };
         let copy = embed(&map, &key(), "ACME", COEFFICIENTS, &parameters).unwrap();
@@ -87,7 +86,8 @@ fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_in_every_shape() 
 #[test]
 fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
     let town = town();
-    let (map, key, parameters) = (town.on(METRES, None), key(), Parameters::of_fingerprint());
+    let (map, key, parameters) =
+        (town.on(&Ground::METRES, &Ground::METRES), key(), Parameters::of_fingerprint());
     let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
     let embedding = embedding.for_many().unwrap();
     let names = ["ACME", "Öster AB"];
@@ -102,7 +102,7 @@ fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
 #[test]
 fn the_displacement_is_that_of_a_message() {
     let town = town();
-    let (map, parameters) = (town.on(METRES, None), Parameters::of_fingerprint());
+    let (map, parameters) = (town.on(&Ground::METRES, &Ground::METRES), Parameters::of_fingerprint());
     let of_recipient = embed(&map, &key(), "ACME", COEFFICIENTS, &parameters).unwrap().displacement;
     let message = Message::from_bytes(&[0x5a; 16]);
     let of_message = embedding::embed(&map, &key(), &message, &Parameters::default()).unwrap().displacement;
@@ -112,7 +112,7 @@ fn the_displacement_is_that_of_a_message() {
 #[test]
 fn a_map_without_room_and_a_mark_without_effect_are_refused() {
     let town = town();
-    let map = town.on(METRES, None);
+    let map = town.on(&Ground::METRES, &Ground::METRES);
     let small = Parameters { patch_size: 250, ..Parameters::of_fingerprint() };
     let refused = embed(&map, &key(), "ACME", COEFFICIENTS, &small).unwrap_err();
     assert!(matches!(refused, Error::TooManySigns { coefficients: COEFFICIENTS, vertices: 250, .. }));
@@ -148,7 +148,7 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
     let town = town();
     // A free map shows every sign.
     let parameters = Parameters { shape: Rigidity::Free, ..Parameters::of_fingerprint() };
-    let map = town.on(METRES, None);
+    let map = town.on(&Ground::METRES, &Ground::METRES);
     let patches = Patches::new(&map, &parameters).unwrap();
     // Messages: the copy of A and its message give the chips, and the chips any other message.
     let [a, b] = ["A", "B"].map(|name| key().recipient_message(name));

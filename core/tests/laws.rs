@@ -19,7 +19,6 @@ use meshmark_core::{
 };
 use proptest::prelude::*;
 
-const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 const MESSAGE: &str = "0123456789abcdef";
 
 fn key() -> SecretKey {
@@ -39,7 +38,7 @@ fn vertices() -> impl Strategy<Value = Vec<[f64; 2]>> {
 
 fn marked(table: &VertexTable, ground: &Ground, parameters: &Parameters) -> Vec<[f64; 2]> {
     let message = Message::from_hex(MESSAGE).unwrap();
-    embed(&Map::of_points(table, *ground), &key(), &message, parameters).unwrap().coords
+    embed(&Map::of_points(table, ground), &key(), &message, parameters).unwrap().coords
 }
 
 fn observed(table: &VertexTable, ground: &Ground, moved: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
@@ -52,7 +51,7 @@ fn read_back(
     observed: &[Option<[f64; 2]>],
     p: &Parameters,
 ) -> [Demodulation; 2] {
-    let patches = Patches::new(&Map::of_points(table, *ground), p).unwrap();
+    let patches = Patches::new(&Map::of_points(table, ground), p).unwrap();
     patches.validate().unwrap();
     let carrier = Carrier::new(&key());
     let disturbance = Deformation::estimate(&patches, observed, 128, p).unwrap().predict(
@@ -78,12 +77,12 @@ proptest! {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { patch_size: 290, ..Parameters::default() };
         let message = Message::from_bytes(&bytes);
-        let moved = embed(&Map::of_points(&table, METRES), &key(), &message, &p).unwrap().coords;
-        let mut seen = observed(&table, &METRES, &moved);
+        let moved = embed(&Map::of_points(&table, &Ground::METRES), &key(), &message, &p).unwrap().coords;
+        let mut seen = observed(&table, &Ground::METRES, &moved);
         for displacement in seen.iter_mut().step_by(6) {
             *displacement = None;
         }
-        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, &Ground::METRES), &p).unwrap();
         let disturbance = Deformation::none(0.02).predict(&patches, &seen, 256, p.amplitude_m);
         let found = demodulation::joint(
             &patches, &Carrier::new(&key()), &seen, 128, &p, &disturbance, &|_| ()).unwrap();
@@ -100,7 +99,7 @@ proptest! {
     ) {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { basis: laplacian, ..small() };
-        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, &Ground::METRES), &p).unwrap();
         for patch in patches.as_slice() {
             let n = patch.vertices.len();
             let basis = Basis::low_frequencies(patch, n).unwrap();
@@ -114,7 +113,7 @@ proptest! {
     fn eigenvectors_satisfy_the_cotangent_laplacian(points in vertices()) {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { basis: Laplacian::Cotangent, patch_size: table.len(), ..small() };
-        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, &Ground::METRES), &p).unwrap();
         let basis = Basis::low_frequencies(&patches.as_slice()[0], 100).unwrap();
         let mesh = Mesh::delaunay(&table.local(1.0)).unwrap();
         let stiffness = stiffness(table.coords(), mesh.triangles());
@@ -133,7 +132,7 @@ proptest! {
     #[test]
     fn eigenvectors_satisfy_the_biggs_laplacian(points in vertices()) {
         let table = VertexTable::new(points).unwrap();
-        let patches = Patches::new(&Map::of_points(&table, METRES), &small()).unwrap();
+        let patches = Patches::new(&Map::of_points(&table, &Ground::METRES), &small()).unwrap();
         let patch = &patches.as_slice()[0];
         let basis = Basis::low_frequencies(patch, 100).unwrap();
         for i in 0..100 {
@@ -158,7 +157,7 @@ proptest! {
         shuffled.extend_from_slice(&points[..50]); // shared vertices occur more than once
         let (a, b) = (VertexTable::new(points).unwrap(), VertexTable::new(shuffled).unwrap());
         prop_assert_eq!(&a, &b);
-        prop_assert_eq!(marked(&a, &METRES, &small()), marked(&b, &METRES, &small()));
+        prop_assert_eq!(marked(&a, &Ground::METRES, &small()), marked(&b, &Ground::METRES, &small()));
     }
 
     #[test]
@@ -169,7 +168,7 @@ proptest! {
     ) {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { tolerance_m, precision_crs_units: precision, amplitude_m: 0.2, ..small() };
-        for (from, to) in table.coords().iter().zip(marked(&table, &METRES, &p)) {
+        for (from, to) in table.coords().iter().zip(marked(&table, &Ground::METRES, &p)) {
             prop_assert!((to[0] - from[0]).hypot(to[1] - from[1]) <= tolerance_m);
             if let Some(grid) = precision {
                 prop_assert!(to.iter().all(|v| (v / grid - (v / grid).round()).abs() < 1e-6));
@@ -181,15 +180,15 @@ proptest! {
     fn both_demodulators_read_the_message_when_half_of_the_vertices_are_gone(points in vertices()) {
         let table = VertexTable::new(points).unwrap();
         let p = Parameters { amplitude_m: 0.1, ..small() };
-        let mut seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-        for found in read_back(&table, &METRES, &seen, &p) {
+        let mut seen = observed(&table, &Ground::METRES, &marked(&table, &Ground::METRES, &p));
+        for found in read_back(&table, &Ground::METRES, &seen, &p) {
             prop_assert_eq!(found.message().to_hex(), MESSAGE);
         }
         for displacement in seen.iter_mut().step_by(2) {
             *displacement = None;
         }
         let message = Message::from_hex(MESSAGE).unwrap();
-        let [paper, joint] = read_back(&table, &METRES, &seen, &p);
+        let [paper, joint] = read_back(&table, &Ground::METRES, &seen, &p);
         prop_assert!(joint.mark_score(&message) > 8.0 && paper.mark_score(&message) > 8.0);
         prop_assert!(joint.message().errors(&message) <= paper.message().errors(&message));
     }
@@ -217,7 +216,7 @@ fn output_is_bit_equal_for_any_number_of_threads() {
     let table = grid(40);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| marked(&table, &METRES, &small()))
+        pool.install(|| marked(&table, &Ground::METRES, &small()))
     };
     assert!(with(1) == with(2) && with(2) == with(8));
 }
@@ -226,7 +225,7 @@ fn output_is_bit_equal_for_any_number_of_threads() {
 #[test]
 fn messages_marked_together_are_those_marked_alone() {
     let table = grid(40);
-    let map = Map::of_points(&table, METRES);
+    let map = Map::of_points(&table, &Ground::METRES);
     for parameters in [small(), Parameters { shape: meshmark_core::options::Rigidity::Rigid, ..small() }] {
         let messages =
             [MESSAGE, "fedcba9876543210", "00ff00ff00ff00ff"].map(|h| Message::from_hex(h).unwrap());
@@ -301,7 +300,7 @@ fn another_solver_gives_the_same_basis_on_grids_and_on_patches_that_fall_apart()
     for table in [grid(20), grid(25), clusters()] {
         for laplacian in [Laplacian::Biggs, Laplacian::Cotangent] {
             let p = Parameters { basis: laplacian, ..small() };
-            for patch in Patches::new(&Map::of_points(&table, METRES), &p).unwrap().as_slice() {
+            for patch in Patches::new(&Map::of_points(&table, &Ground::METRES), &p).unwrap().as_slice() {
                 assert!(largest_difference(patch, 129) < 1e-6, "{laplacian:?}");
             }
         }
@@ -351,8 +350,8 @@ fn another_solver_gives_the_same_basis_on_paths_cycles_stars_and_complete_graphs
 fn a_mark_made_with_one_solver_is_read_with_another() {
     for table in [grid(20), clusters()] {
         let p = small();
-        let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-        let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+        let seen = observed(&table, &Ground::METRES, &marked(&table, &Ground::METRES, &p));
+        let patches = Patches::new(&Map::of_points(&table, &Ground::METRES), &p).unwrap();
         let mut scores = vec![0.0; 64];
         for (number, patch) in patches.as_slice().iter().enumerate() {
             let basis = Basis::with_solver(patch, 129, by_nalgebra).unwrap();
@@ -373,8 +372,8 @@ fn a_mark_made_with_one_solver_is_read_with_another() {
 fn decoy_keys_score_like_a_standard_normal_on_a_marked_map() {
     let table = grid(25);
     let p = small();
-    let seen = observed(&table, &METRES, &marked(&table, &METRES, &p));
-    let patches = Patches::new(&Map::of_points(&table, METRES), &p).unwrap();
+    let seen = observed(&table, &Ground::METRES, &marked(&table, &Ground::METRES, &p));
+    let patches = Patches::new(&Map::of_points(&table, &Ground::METRES), &p).unwrap();
     let message = Message::from_hex(MESSAGE).unwrap();
     let score = |seed: u8| {
         let carrier = Carrier::new(&SecretKey::from_bytes([seed; 32]));
@@ -397,7 +396,7 @@ fn what_a_map_with_too_few_vertices_is_advised_to_use_works() {
     let scattered = |count: u64| (0..count).map(|i| [(i * 7919 % 1009) as f64, (i * 104_729 % 997) as f64]);
     for count in [16, 17, 33, 68, 128, 129, 130, 256, 257, 300, 513, 600] {
         let table = VertexTable::new(scattered(count).collect()).unwrap();
-        let map = Map::of_points(&table, METRES);
+        let map = Map::of_points(&table, &Ground::METRES);
         for (code, chip_rate) in
             [(Code::Ldpc, 1), (Code::Ldpc, 3), (Code::Repetition, 2), (Code::Repetition, 9)]
         {

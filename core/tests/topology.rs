@@ -14,8 +14,6 @@ use meshmark_core::{
 };
 use proptest::prelude::*;
 
-const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
 /// Coordinates, the pairs of them that are joined, and which of these are sides of polygons, before
 /// duplicates are merged.
 #[derive(Debug, Clone, Default)]
@@ -40,7 +38,7 @@ impl Town {
 
     fn map(&self) -> Map<'_> {
         let Town { vertices, segments, polygon_roots } = self;
-        Map { segments, polygon_roots, ..Map::of_points(vertices, METRES) }
+        Map { segments, polygon_roots, ..Map::of_points(vertices, &Ground::METRES) }
     }
 
     fn coords(&self) -> &[[f64; 2]] {

@@ -11,6 +11,7 @@ use meshmark_core::{
     scale::{Scale, ScaleLattice},
     vertices::VertexTable,
 };
+use std::sync::Arc;
 
 /// The furthest coordinates that mean a place, in turns around the Earth: maps continue past the date
 /// line, and eastings may begin with the number of their zone.
@@ -137,11 +138,13 @@ impl CoordinateSystem {
         places.into_iter().map(place).collect()
     }
 
-    /// Measures the scales of a map for which the scale of its ground is not exact everywhere.
-    pub(crate) fn lattice(&self, table: &VertexTable, ground: &Ground) -> Option<ScaleLattice> {
+    /// Measures the ground at many places of a map for which `ground` is not exact everywhere.
+    pub(crate) fn uneven(&self, table: &VertexTable, ground: &Ground) -> Option<Ground> {
         let Ground::Plane { metres_per_unit } = *ground else { return None };
         let local = Local::new(self)?;
-        ScaleLattice::measure(table, metres_per_unit, NEGLIGIBLE, |places| local.scales(places))
+        let lattice =
+            ScaleLattice::measure(table, metres_per_unit, NEGLIGIBLE, |places| local.scales(places));
+        lattice.map(|lattice| Ground::Uneven(Arc::new(lattice)))
     }
 
     fn ground(&self, table: &VertexTable) -> Result<Ground> {
@@ -264,7 +267,7 @@ pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Res
     if degrees && !table.is_empty() {
         return Err(Error::NoCrs);
     }
-    Ok(Ground::Plane { metres_per_unit: 1.0 })
+    Ok(Ground::METRES)
 }
 
 /// Reprojects coordinates into `target`; those of a layer without a CRS are assumed to be in it.
@@ -333,7 +336,7 @@ mod tests {
     fn degrees_without_a_crs_are_refused_and_metres_without_one_are_not() {
         let table = |x| VertexTable::new(vec![[x, 60.0]]).unwrap();
         assert!(matches!(ground(None, &table(25.0)), Err(Error::NoCrs)));
-        assert_eq!(ground(None, &table(2500.0)).unwrap(), Ground::Plane { metres_per_unit: 1.0 });
+        assert_eq!(ground(None, &table(2500.0)).unwrap(), Ground::METRES);
     }
 
     #[test]

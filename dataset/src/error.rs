@@ -172,11 +172,16 @@ impl Error {
                 spelling.name("AMPLITUDE")
             ),
             Error::UnevenScale { ends: [shortest, longest], off_percent, crs } => format!(
-                "the scale of {crs} differs by {off_percent:.0} % from the one that a mark takes for the whole map, so vertices \
-                 would move further than is asked for: a unit is the shortest at the vertex ({}, {}), and the longest at \
-                 ({}, {}); reproject the map, for example to its UTM zone or to EPSG:4326, or leave out what lies far from \
-                 the rest",
-                shortest[0], shortest[1], longest[0], longest[1]
+                "the scale of {crs} differs by {off_percent:.0} % from the one that the mark of a message takes for the whole \
+                 map, so vertices would move further than is asked for: a unit is the shortest at the vertex ({}, {}), and \
+                 the longest at ({}, {}); mark for a recipient without {} and {}, reproject the map, for example to its UTM zone or to \
+                 EPSG:4326, or leave out what lies far from the rest",
+                shortest[0],
+                shortest[1],
+                longest[0],
+                longest[1],
+                spelling.name("CODE"),
+                spelling.name("CHIP_RATE")
             ),
             Error::Traces(traces) => {
                 format!(

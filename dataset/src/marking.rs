@@ -8,6 +8,7 @@ use crate::{
 use meshmark_core::{
     embedding::Marked,
     fingerprint_record::{self, CopyEntry, FingerprintRecord, FingerprintShape, PartEntry, ReferenceEntry},
+    ground::Ground,
     key::SecretKey,
     map::Map,
     message::{ADVISED_BITS, LEAST_IDENTIFYING_BITS, Message},
@@ -15,7 +16,6 @@ use meshmark_core::{
     part::PartDigest,
     record::{self, Distortion, Record, Reference, TopologyEntry},
     recorded::Recorded,
-    scale::Measure,
     vertices::VertexTable,
 };
 use std::borrow::Cow;
@@ -81,13 +81,17 @@ pub fn check_extent(map: &Map, parameters: &Parameters) -> Result<()> {
     }
 }
 
-/// Fails where the error of the mark's one scale is so large that vertices would move further than
-/// wanted.
+/// Fails where the mark has one scale, and its error is so large that vertices would move further
+/// than wanted.
 ///
 /// # Errors
 /// [`Error::UnevenScale`].
 pub fn check_scale(map: &Map, crs: Option<&CoordinateSystem>) -> Result<()> {
-    match map.measure().unevenness(map.vertices) {
+    let uneven = match (map.ground, map.measure) {
+        (Ground::Plane { .. }, Ground::Uneven(lattice)) => lattice.unevenness(map.vertices),
+        _ => None,
+    };
+    match uneven {
         None => Ok(()),
         Some((off, ends)) => {
             let crs = crs.map_or_else(String::new, CoordinateSystem::brief_name);
@@ -156,7 +160,7 @@ pub fn reference(map: &Survey, patches: usize) -> Reference {
 pub struct Unmarked<'a> {
     geometries: &'a Geometries,
     coords: &'a [[f64; 2]],
-    measure: Measure<'a>,
+    measure: &'a Ground,
     state: State,
 }
 
@@ -166,7 +170,7 @@ impl<'a> Unmarked<'a> {
         let coords = map.vertices.coords();
         let state =
             State::measure(outlines(geometries, &|number| Cow::Owned(geometries.outline(number, coords))));
-        Unmarked { geometries, coords, measure: map.measure(), state }
+        Unmarked { geometries, coords, measure: map.measure, state }
     }
 
     /// Returns the distortion of a marked copy.

@@ -20,7 +20,7 @@ use meshmark_core::{
     ground::Ground,
     map::Map,
     map_data::{Label, MapData, Polyline},
-    scale::ScaleLattice,
+    options::{AmplitudeOf, Parameters},
 };
 use std::{collections::BTreeMap, ops::Range};
 
@@ -36,8 +36,8 @@ pub struct Survey {
     pub crs: Option<CoordinateSystem>,
     /// Metres per unit; `None` where the map has no CRS and its units may be degrees.
     ground: Option<Ground>,
-    /// Metres per unit at the place of a vertex, where they vary.
-    lattice: Option<ScaleLattice>,
+    /// Metres per unit at the place of a vertex, where they vary over a projected map.
+    uneven: Option<Ground>,
     /// The geometries in the order of reading, if they were requested.
     pub geometries: Option<Geometries>,
     /// The number of features of each layer read, by the number of the layer in the dataset.
@@ -47,28 +47,26 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Returns the ground metric.
+    /// Returns metres on the ground at the place of a vertex.
     ///
     /// # Errors
     /// Fails with [`Error::NoCrs`].
-    pub fn ground(&self) -> Result<Ground> {
-        self.ground.ok_or(Error::NoCrs)
+    pub fn measure(&self) -> Result<&Ground> {
+        self.uneven.as_ref().or(self.ground.as_ref()).ok_or(Error::NoCrs)
     }
 
-    /// Returns the metric of a map whose data are no longer needed.
+    /// Returns the map as input of the algorithm. Marks of messages have one scale for a projected
+    /// map; fingerprints follow its ground.
     ///
     /// # Errors
     /// Fails with [`Error::NoCrs`].
-    pub fn into_scales(self) -> Result<(Ground, Option<ScaleLattice>)> {
-        Ok((self.ground()?, self.lattice))
-    }
-
-    /// Returns the map as input of the algorithm.
-    ///
-    /// # Errors
-    /// Fails with [`Error::NoCrs`].
-    pub fn map(&self) -> Result<Map<'_>> {
-        Ok(self.data.on(self.ground()?, self.lattice.as_ref()))
+    pub fn map(&self, parameters: &Parameters) -> Result<Map<'_>> {
+        let measure = self.measure()?;
+        let ground = match parameters.amplitude_of {
+            AmplitudeOf::Coefficient => self.ground.as_ref().ok_or(Error::NoCrs)?,
+            AmplitudeOf::Displacement => measure,
+        };
+        Ok(self.data.on(ground, measure))
     }
 }
 
@@ -211,10 +209,10 @@ impl Found {
             Err(Error::NoCrs) => None,
             Err(other) => return Err(other),
         };
-        let lattice =
-            crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.lattice(&data.vertices, ground));
+        let uneven =
+            crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.uneven(&data.vertices, ground));
         let geometries = keeps_geometries.then(|| Geometries::new(indices, chains));
-        Ok(Survey { data, crs, ground, lattice, geometries, features, left_out })
+        Ok(Survey { data, crs, ground, uneven, geometries, features, left_out })
     }
 }
 

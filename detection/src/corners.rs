@@ -217,7 +217,6 @@ mod tests {
     use super::*;
     use meshmark_core::map_data::ChainKind;
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
     const REACH_M: f64 = 1.5;
 
     fn rings(rings: &[Vec<[f64; 2]>]) -> MapData {
@@ -274,7 +273,7 @@ mod tests {
     }
 
     fn found(reference: &MapData, suspect: &MapData, tolerance: &Tolerance) -> Corners {
-        let lines = Lines::new((reference, suspect), &METRES, suspect.vertices.coords());
+        let lines = Lines::new((reference, suspect), &Ground::METRES, suspect.vertices.coords());
         lines.corners([0.0; 2], REACH_M, tolerance)
     }
 
@@ -346,7 +345,7 @@ mod tests {
         for tolerance in &TOLERANCES {
             let right = found(&reference, &suspect, tolerance).count();
             assert!(found(&reference, &rings(&turned), tolerance).count() < right / 10);
-            let lines = Lines::new((&reference, &suspect), &METRES, suspect.vertices.coords());
+            let lines = Lines::new((&reference, &suspect), &Ground::METRES, suspect.vertices.coords());
             assert!(lines.corners([11.0, -7.7], REACH_M, tolerance).count() < right / 10);
         }
         let points = MapData::of_points(suspect.vertices.clone());

@@ -103,8 +103,6 @@ mod tests {
     use crate::matching::Matcher;
     use meshmark_core::{ground::Ground, map_data::ChainKind};
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     /// Houses of five corners and of different sizes, 20 m apart.
     fn town() -> MapData {
         let size = |house: usize| 7.0 + (house % 7) as f64 * 0.8;
@@ -120,7 +118,7 @@ mod tests {
     fn a_house_that_went_elsewhere_is_found_there_and_scattered_vertices_are_not() {
         let town = town();
         let coords = town.vertices.coords();
-        let matcher = Matcher::new(coords, &METRES, town.vertices.centre());
+        let matcher = Matcher::new(coords, &Ground::METRES, town.vertices.centre());
         let shift = |root: u32| [f64::from(root % 11) * 0.7 - 3.5, f64::from(root % 7) * 0.8 - 2.4];
         let moved: Vec<[f64; 2]> = (coords.iter().zip(&town.polygon_roots))
             .map(|(p, &root)| [p[0] + shift(root)[0], p[1] + shift(root)[1]])

@@ -262,8 +262,6 @@ mod tests {
     use super::*;
     use meshmark_core::map_data::ChainKind;
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     /// Returns a number from 0 to 1 that looks random.
     fn random(i: usize) -> f64 {
         ((i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / 2f64.powi(53)
@@ -297,7 +295,7 @@ mod tests {
         let coords = town.vertices.coords();
         let moved: Vec<[f64; 2]> = coords.iter().map(|p| bent(*p)).collect();
         let pairs = coords.iter().step_by(5).map(|p| [bent(*p), *p]).collect();
-        let grown = Growth::new(&town, &METRES, pairs).grow(&moved).unwrap();
+        let grown = Growth::new(&town, &Ground::METRES, pairs).grow(&moved).unwrap();
         let miss = |(a, b): &(&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
         let found = grown.iter().zip(&moved).filter(|pair| miss(pair) < 1.0).count();
         assert!(found as f64 > 0.7 * coords.len() as f64, "{found} of {}", coords.len());
@@ -306,6 +304,6 @@ mod tests {
     #[test]
     fn another_town_is_no_deformation() {
         let (town, other) = (town(0), town(1));
-        assert!(Growth::new(&town, &METRES, Vec::new()).grow(other.vertices.coords()).is_none());
+        assert!(Growth::new(&town, &Ground::METRES, Vec::new()).grow(other.vertices.coords()).is_none());
     }
 }

@@ -29,7 +29,7 @@
 //! let coords = (0..2000).map(|i| [corner(i)[0] + house(i)[0], corner(i)[1] + house(i)[1]]).collect();
 //! let starts: Vec<u32> = (0..2000).step_by(5).collect();
 //! let (town, _) = MapData::from_chains(coords, &starts, vec![ChainKind::Shell; 400])?;
-//! let map = town.on(Ground::Plane { metres_per_unit: 1.0 }, None);
+//! let map = town.on(&Ground::METRES, &Ground::METRES);
 //!
 //! let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::default());
 //! let recipient = Subject::Recipient("ACME GmbH".into());

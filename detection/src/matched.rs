@@ -34,7 +34,7 @@ impl<'a> Reference<'a> {
     pub fn new(data: &'a MapData, map: &Map, bits: usize, parameters: &Parameters) -> Result<Self> {
         let patches = Patches::new(map, parameters)?;
         let carriers = patches.carriers(bits, parameters)?;
-        Ok(Reference { data, ground: map.ground, patches, carriers })
+        Ok(Reference { data, ground: map.ground.clone(), patches, carriers })
     }
 
     /// Meshes a map and cuts it into patches, as [`Self::new`] does, for fingerprints of
@@ -50,7 +50,7 @@ impl<'a> Reference<'a> {
     ) -> Result<Self> {
         let patches = Patches::new(map, parameters)?;
         let carriers = patches.check_room(coefficients)?;
-        Ok(Reference { data, ground: map.ground, patches, carriers })
+        Ok(Reference { data, ground: map.ground.clone(), patches, carriers })
     }
 }
 

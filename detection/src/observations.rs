@@ -249,7 +249,6 @@ mod tests {
         message::Message,
     };
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
     /// The corners of a house; the last one is the first one.
     const HOUSE: [[f64; 2]; 5] = [[0.0, 0.0], [14.0, 0.0], [14.0, 9.0], [0.0, 9.0], [0.0, 0.0]];
 
@@ -270,13 +269,13 @@ mod tests {
     /// it was read from.
     fn read(alter: impl Fn(Vec<[f64; 2]>) -> MapData) -> (f64, Observations) {
         let (town, indices) = town();
-        let map = town.on(METRES, None);
+        let map = town.on(&Ground::METRES, &Ground::METRES);
         let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::default());
         let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
         let copy = embedding::embed(&map, &key, &message, &parameters).unwrap();
         let suspect = alter(indices.iter().map(|&vertex| copy.coords[vertex as usize]).collect());
         let reference = Reference::new(&town, &map, 128, &parameters).unwrap();
-        let registration = Registrar::new(&town, &METRES, 1.0).register(&suspect, Start::None);
+        let registration = Registrar::new(&town, &Ground::METRES, 1.0).register(&suspect, Start::None);
         let matched = Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData);
         assert!(!matched.is_chance(Demodulator::Joint));
         let mark = Mark { key: &key, bits: 128, parameters: &parameters };

@@ -7,7 +7,6 @@ use meshmark_core::{
 use meshmark_detection::registration::{Affine, Method, Registrar, Start};
 use std::f64::consts::TAU;
 
-const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 /// Distance between new vertices of the suspect, metres.
 const SPACING_M: f64 = 1.3;
 /// Maps the suspect onto the reference: it was mirrored, turned, scaled and moved.
@@ -75,7 +74,8 @@ fn rings_and_lines_with_new_vertices_are_registered_by_their_course() {
         let curves = curves(closed, 1);
         let reference = map(&curves, closed);
         let suspect: Vec<_> = curves.iter().map(|curve| drawn_anew(curve, closed)).collect();
-        let found = Registrar::new(&reference, &METRES, 1.0).register(&map(&suspect, closed), Start::Auto);
+        let found =
+            Registrar::new(&reference, &Ground::METRES, 1.0).register(&map(&suspect, closed), Start::Auto);
         assert_eq!(found.method, Method::Curves, "closed {closed}");
         for place in suspect.concat() {
             let ([u, v], [s, t]) = (AFFINE.apply(place), found.apply(&[place])[0]);
@@ -89,7 +89,8 @@ fn another_map_is_not_registered() {
     for closed in [true, false] {
         let reference = map(&curves(closed, 1), closed);
         let foreign: Vec<_> = curves(closed, 2).iter().map(|curve| drawn_anew(curve, closed)).collect();
-        let found = Registrar::new(&reference, &METRES, 1.0).register(&map(&foreign, closed), Start::Auto);
+        let found =
+            Registrar::new(&reference, &Ground::METRES, 1.0).register(&map(&foreign, closed), Start::Auto);
         assert_eq!((found.method, found.matched), (Method::Identity, 0), "closed {closed}");
     }
 }

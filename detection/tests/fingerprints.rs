@@ -19,7 +19,6 @@ use meshmark_detection::{
 };
 use std::sync::LazyLock;
 
-const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
 const HOUSES: usize = 900;
 /// The corners of a house; the last one is the first one.
 const HOUSE: [[f64; 2]; 6] = [[0.0, 0.0], [9.0, 0.0], [9.0, 7.0], [4.0, 7.0], [0.0, 6.0], [0.0, 0.0]];
@@ -45,7 +44,7 @@ static TOWN: LazyLock<Town> = LazyLock::new(|| {
     let corners: Vec<[f64; 2]> = corners.collect();
     let (data, indices) = rings(corners.clone());
     let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::of_fingerprint());
-    let map = data.on(METRES, None);
+    let map = data.on(&Ground::METRES, &Ground::METRES);
     let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
     let marks: Vec<_> = (0..COPIES).map(|k| embedding.fingerprint(&name(k))).collect();
     let wanted = embedding.wanted(&marks, &|_| ()).unwrap();
@@ -83,10 +82,10 @@ fn random(i: usize) -> f64 {
 /// Lets `f` see the suspect as matched with its reference.
 fn with_suspect<T>(corners: Vec<[f64; 2]>, f: impl FnOnce(&Matched) -> T) -> T {
     let town = &TOWN;
-    let (map, parameters) = (town.data.on(METRES, None), Parameters::of_fingerprint());
+    let (map, parameters) = (town.data.on(&Ground::METRES, &Ground::METRES), Parameters::of_fingerprint());
     let reference = Reference::for_fingerprints(&town.data, &map, COEFFICIENTS, &parameters).unwrap();
     let (suspect, _) = rings(corners);
-    let registration = Registrar::new(&town.data, &METRES, 1.0).register(&suspect, Start::None);
+    let registration = Registrar::new(&town.data, &Ground::METRES, 1.0).register(&suspect, Start::None);
     f(&Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData))
 }
 

@@ -41,7 +41,7 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
     let options = Options::parse([("RECIPIENT", RECIPIENT)]).expect("they are legal");
     let (key, parameters) = (key(), &options.parameters);
     let map = read(&reference_path(), &Selection { geometries: true, ..Selection::default() });
-    let on_ground = map.map().expect("a projected CRS");
+    let on_ground = map.map(parameters).expect("a projected CRS");
     let embedding = FingerprintEmbedding::new(&on_ground, &key, COEFFICIENTS, parameters).expect("it fits");
     let fingerprint = embedding.fingerprint(RECIPIENT);
     let wanted = embedding.wanted(&[fingerprint], &|_| ()).expect("it converges");
@@ -87,7 +87,7 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
 }
 
 fn estimates(map: &Survey, marked: &Marked, parameters: &Parameters) -> Estimates {
-    let on_ground = map.map().expect("a projected CRS");
+    let on_ground = map.map(parameters).expect("a projected CRS");
     let patches = Patches::new(&on_ground, parameters).expect("it fits");
     let pairs = map.data.vertices.coords().iter().zip(&marked.coords);
     let observed: Vec<_> =

@@ -96,10 +96,10 @@ impl ReferenceMarking {
     /// Panics when it cannot be marked.
     pub fn new() -> Self {
         let map = read(&reference_path(), &Selection::default());
-        let on_ground = map.map().expect("a projected CRS");
-        let ground = on_ground.ground;
         let code = Code::Repetition;
         let parameters = Parameters { code, chip_rate: code.default_chip_rate(), ..Parameters::default() };
+        let on_ground = map.map(&parameters).expect("a projected CRS");
+        let ground = on_ground.ground.clone();
         let message = key().recipient_message(RECIPIENT);
         let marked = embed(&on_ground, &key(), &message, &parameters).expect("it fits");
         let patches = Patches::new(&on_ground, &parameters).expect("it fits");

@@ -66,8 +66,8 @@ fn the_message_can_be_read_from_what_ogr2ogr_wrote() {
     let moves = moves(&contents::read(&fixture("kotka.gpkg")), &contents::read(&host.path("marked.gpkg")));
 
     let reference = survey_of(&fixture("kotka.gpkg"));
-    let (table, ground) = (&reference.data.vertices, reference.ground().unwrap());
-    let patches = Patches::new(&reference.map().unwrap(), &record.parameters).unwrap();
+    let (table, ground) = (&reference.data.vertices, reference.measure().unwrap());
+    let patches = Patches::new(&reference.map(&record.parameters).unwrap(), &record.parameters).unwrap();
     let mut observed = vec![None; table.len()];
     for (from, to) in moves {
         observed[table.index_of(from).unwrap()] = Some(ground.metres_between(from, to));

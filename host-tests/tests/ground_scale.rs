@@ -31,16 +31,17 @@ fn town_and_point(longitude: f64, latitude: f64) -> Host {
 }
 
 #[test]
-fn a_map_with_a_point_near_the_pole_is_refused_and_the_point_is_named() {
+fn a_message_is_refused_on_a_map_with_a_point_near_the_pole_which_is_named() {
     let host = town_and_point(27.0, 89.99);
     let before = host.files();
-    let run = host.mark("GPKG", "marked.gpkg", "map.gpkg", &[]);
+    let run = host.mark("GPKG", "marked.gpkg", "map.gpkg", &["-oo", "CODE=LDPC"]);
     let [error] = run.errors()[..] else { panic!("{}", run.stderr) };
     assert_ne!(run.code, Some(0));
-    for word in ["the scale of EPSG:3857 differs by", "%", "the shortest at the vertex (3005", "EPSG:4326"] {
+    for word in ["the scale of EPSG:3857 differs by", "%", "the shortest at the vertex (3005", "without CODE"]
+    {
         assert!(error.contains(word), "{word} is not in: {error}");
     }
-    let written = host.create("out.gpkg", "map.gpkg", &[]);
+    let written = host.create("out.gpkg", "map.gpkg", &["-dsco", "CODE=LDPC"]);
     assert!(
         written.code != Some(0) && written.stderr.contains("the scale of EPSG:3857 differs"),
         "{}",
@@ -49,7 +50,8 @@ fn a_map_with_a_point_near_the_pole_is_refused_and_the_point_is_named() {
     fs::write(host.path("list.csv"), "recipient\nACME\n").unwrap();
     let command = host.meshmark();
     let arguments = ["distribute", "--key", "key.json", "--recipients", "list.csv", "--output-dir", "out"];
-    let run = host.run(command.to_str().unwrap(), &[&arguments[..], &["-f", "GPKG", "map.gpkg"]].concat());
+    let more = ["--code", "LDPC", "-f", "GPKG", "map.gpkg"];
+    let run = host.run(command.to_str().unwrap(), &[&arguments[..], &more].concat());
     assert!(run.code != Some(0) && run.stderr.contains("the scale of EPSG:3857 differs"), "{}", run.stderr);
     fs::remove_file(host.path("list.csv")).unwrap();
     assert!(host.files() == before, "nothing is written");
@@ -59,12 +61,35 @@ fn a_map_with_a_point_near_the_pole_is_refused_and_the_point_is_named() {
 }
 
 #[test]
+fn a_fingerprint_follows_the_scale_from_town_to_pole() {
+    let host = town_and_point(27.0, 89.99);
+    host.mark("GPKG", "marked.gpkg", "map.gpkg", &["-oo", "RECORD=record.json"]).succeeds();
+    host.create("written.gpkg", "map.gpkg", &["-dsco", "RECORD=written.json"]).succeeds();
+    let same = |name: &str| host.run("ogrinfo", &["-q", "-al", name]).succeeds().stdout;
+    assert_eq!(same("marked.gpkg"), same("written.gpkg"));
+    let command = host.meshmark();
+    // In metres of its own CRS the town moves as far as was asked for.
+    for file in ["map", "marked"] {
+        let (from, to) = (format!("{file}.gpkg"), format!("{file}-3067.gpkg"));
+        host.run("ogr2ogr", &[&to, &from, "buildings", "-t_srs", "EPSG:3067"]).succeeds();
+    }
+    let run =
+        host.run(command.to_str().unwrap(), &["compare", "--json", "map-3067.gpkg", "marked-3067.gpkg"]);
+    let compared: Value = serde_json::from_str(&run.succeeds().stdout).unwrap();
+    let moved = |figure: &str| compared["displacement"][figure].as_f64().unwrap();
+    assert!((0.05..0.12).contains(&moved("rms_m")) && moved("max_m") < 0.76, "{compared}");
+    host.matches("map.gpkg", &["--record", "record.json", "marked.gpkg"]);
+    host.matches("map.gpkg", &["--recipient", "ACME GmbH", "marked.gpkg"]);
+    host.matches("map.gpkg", &["--record", "record.json", "marked-3067.gpkg"]);
+}
+
+#[test]
 fn the_same_map_in_degrees_is_marked_within_the_tolerance() {
     let host = town_and_point(27.0, 89.9);
     host.run("ogr2ogr", &["degrees.gpkg", "map.gpkg", "-t_srs", "EPSG:4326"]).succeeds();
     host.mark("GPKG", "marked.gpkg", "degrees.gpkg", &["-oo", "RECORD=record.json"]).succeeds();
     let record: Value = serde_json::from_slice(&fs::read(host.path("record.json")).unwrap()).unwrap();
-    let moved = |figure: &str| record["distortion"]["displacement"][figure].as_f64().unwrap();
+    let moved = |figure: &str| record["displacement"][figure].as_f64().unwrap();
     assert!((0.05..0.15).contains(&moved("rms_m")) && moved("max_m") <= 0.75, "{record}");
 }
 
@@ -78,7 +103,7 @@ fn a_map_over_which_the_scale_differs_little_is_measured_where_the_vertex_is() {
     let command = host.meshmark();
     let run = host.run(command.to_str().unwrap(), &["compare", "--json", "map.gpkg", "marked.gpkg"]);
     let compared: Value = serde_json::from_str(&run.succeeds().stdout).unwrap();
-    assert_eq!(record["distortion"]["displacement"], compared["displacement"]);
+    assert_eq!(record["displacement"], compared["displacement"]);
     // In metres of its own CRS the town moves equally far.
     for file in ["map", "marked"] {
         let (from, to) = (format!("{file}.gpkg"), format!("{file}-3067.gpkg"));

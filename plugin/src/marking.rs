@@ -161,7 +161,7 @@ impl Marking {
         output::check_is_not_source(&source.files)?;
         let mut map = survey(source.dataset, &selection(options, source.last_failure))?;
         source.files.check()?; // what was surveyed is what was opened
-        let on_ground = map.map()?;
+        let on_ground = map.map(&options.parameters)?;
         marking::check_extent(&on_ground, &options.parameters)?;
         marking::check_scale(&on_ground, map.crs.as_ref())?;
         let pool = pool(threads)?;
@@ -227,7 +227,7 @@ impl Marking {
         threads: usize,
     ) -> Result<()> {
         let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = request;
-        let map = self.map.map()?;
+        let map = self.map.map(parameters)?;
         let pairs = map.vertices.coords().iter().zip(found);
         let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();
         let pool = pool(threads)?;

@@ -39,10 +39,11 @@ impl Case {
     fn kotka() -> Self {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/kotka.gpkg");
         let map = survey(&gdal::Dataset::open(path).unwrap(), &Selection::default()).unwrap();
-        let (on_ground, key) = (map.map().unwrap(), SecretKey::from_bytes([7; 32]));
+        let (parameters, key) = (Parameters::default(), SecretKey::from_bytes([7; 32]));
+        let on_ground = map.map(&parameters).unwrap();
         let message = key.recipient_message("ACME GmbH");
-        let marked = embed(&on_ground, &key, &message, &Parameters::default()).unwrap();
-        let ground = on_ground.ground;
+        let marked = embed(&on_ground, &key, &message, &parameters).unwrap();
+        let ground = on_ground.ground.clone();
         Case { reference: map.data, ground, key, marked: marked.coords }
     }
 
@@ -70,7 +71,7 @@ impl Case {
             |(r, s): (&[f64; 2], &Option<u32>)| s.map(|s| self.ground.metres_between(*r, coords[s as usize]));
         let observed: Vec<_> = pairs.map(metres).collect();
         let parameters = Parameters::default();
-        let patches = Patches::new(&self.reference.on(self.ground, None), &parameters).unwrap();
+        let patches = Patches::new(&self.reference.on(&self.ground, &self.ground), &parameters).unwrap();
         let disturbance = Deformation::estimate(&patches, &observed, 256, &parameters).unwrap().predict(
             &patches,
             &observed,
@@ -139,8 +140,13 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
     let case = Case::kotka();
     let message = |name: &str| case.key.recipient_message(name);
     let parameters = Parameters::default();
-    let other = embed(&case.reference.on(case.ground, None), &case.key, &message("Another Ltd"), &parameters)
-        .unwrap();
+    let other = embed(
+        &case.reference.on(&case.ground, &case.ground),
+        &case.key,
+        &message("Another Ltd"),
+        &parameters,
+    )
+    .unwrap();
     let pairs = case.marked.iter().zip(&other.coords);
     let mean: Vec<[f64; 2]> = pairs.map(|(a, b)| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]).collect();
     let found = case.demodulate(&mean, &case.key);
@@ -154,7 +160,8 @@ fn the_mean_of_two_copies_names_both_recipients_and_nobody_else() {
 #[test]
 fn of_forty_other_keys_none_matches_and_their_p_values_are_spread_evenly() {
     let case = Case::kotka();
-    let patches = Patches::new(&case.reference.on(case.ground, None), &Parameters::default()).unwrap();
+    let patches =
+        Patches::new(&case.reference.on(&case.ground, &case.ground), &Parameters::default()).unwrap();
     let pairs = case.reference.vertices.coords().iter().zip(&case.marked);
     let observed: Vec<_> = pairs.map(|(r, s)| Some(case.ground.metres_between(*r, *s))).collect();
     let p_mark = |seed: u8| {

@@ -14,8 +14,6 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
 /// Vertices and polylines without attributes.
 #[derive(Clone)]
 struct Map {
@@ -121,7 +119,7 @@ fn affine(mirror: f64) -> Affine {
 }
 
 fn register(reference: &Map, suspect: &Map, start: Start) -> Registration {
-    Registrar::new(&reference.data(), &METRES, 1.0).register(&suspect.data(), start)
+    Registrar::new(&reference.data(), &Ground::METRES, 1.0).register(&suspect.data(), start)
 }
 
 /// Root mean square distance between vertices of the reference and where `there` and back takes

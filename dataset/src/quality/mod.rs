@@ -12,7 +12,7 @@ pub use sights::Outlines;
 use crate::Outline;
 use meshmark_core::{
     distortion::{Areas, Hausdorff, Overlaps, Spread, Validity},
-    scale::Measure,
+    ground::Ground,
 };
 use rayon::prelude::*;
 use sights::Sight;
@@ -61,7 +61,7 @@ pub struct BeforeAfter<'a> {
     /// The geometries after, and their state.
     pub after: (Outlines<'a>, &'a State),
     /// Metres per unit.
-    pub measure: Measure<'a>,
+    pub measure: &'a Ground,
     /// The grid of the map after, CRS units; 0 without one. Overlaps up to a cell of it are
     /// slivers.
     pub grid: f64,

@@ -156,7 +156,7 @@ mod tests {
     use super::*;
     use crate::quality::{BeforeAfter, Quality, State};
     use gdal::vector::Geometry;
-    use meshmark_core::{ground::Ground, scale::Measure};
+    use meshmark_core::ground::Ground;
     use std::borrow::Cow;
 
     fn outlines(texts: &[String]) -> Vec<Outline> {
@@ -170,9 +170,9 @@ mod tests {
             [&before, &after].map(|all| move |number: usize| Cow::Borrowed(&all[number]));
         let before = Outlines { count: before.len(), get: &get_before };
         let after = Outlines { count: after.len(), get: &get_after };
-        let (states, ground) = ([before, after].map(State::measure), Ground::Plane { metres_per_unit: 1.0 });
-        let measure = Measure { ground, lattice: None };
-        BeforeAfter { before: (before, &states[0]), after: (after, &states[1]), measure, grid }.quality()
+        let (states, ground) = ([before, after].map(State::measure), Ground::METRES);
+        BeforeAfter { before: (before, &states[0]), after: (after, &states[1]), measure: &ground, grid }
+            .quality()
     }
 
     fn square(x: f64, y: f64, size: f64) -> String {

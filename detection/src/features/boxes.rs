@@ -129,15 +129,17 @@ mod tests {
     use super::*;
     use meshmark_core::{areas::Areas, ground::Ground, map_data::ChainKind};
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     #[test]
     fn the_vertex_farthest_out_moves_the_corners_of_a_box() {
         let diamond = vec![[0.0, 4.0], [5.0, 0.0], [11.0, 6.0], [6.0, 9.0], [0.0, 4.0]];
         let (map, indices) = MapData::from_chains(diamond, &[0], [ChainKind::Shell]).unwrap();
         let areas = Areas::new(&indices, &[0], [ChainKind::Shell], &[0]);
-        let points =
-            of(&MapData { areas, ..map }, &Plane::new(&METRES, [0.0; 2]), Frame::UPRIGHT, &OPPOSITE_CORNERS);
+        let points = of(
+            &MapData { areas, ..map },
+            &Plane::new(&Ground::METRES, [0.0; 2]),
+            Frame::UPRIGHT,
+            &OPPOSITE_CORNERS,
+        );
         let (along_x, along_y) = ([[1.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [0.0, 1.0]]);
         let expected = [
             ([0.0, 0.0], [(indices[0], along_x), (indices[1], along_y)]),

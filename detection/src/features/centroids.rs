@@ -95,8 +95,6 @@ mod tests {
     use super::*;
     use meshmark_core::{areas::Areas, ground::Ground, map_data::ChainKind, vertices::VertexTable};
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     /// A square with a hole, clockwise, and a distant triangle of the same feature, at these places.
     fn point(places: &[[f64; 2]]) -> FeaturePoint {
         use ChainKind::{Hole, Shell};
@@ -107,7 +105,7 @@ mod tests {
         };
         let chains: Vec<u32> = [0, 1, 2, 3, 0, 4, 5, 6, 7, 4, 8, 9, 10, 8].map(index).to_vec();
         map.areas = Areas::new(&chains, &[0, 5, 10], [Shell, Hole, Shell], &[0]);
-        let mut points = of(&map, &Plane::new(&METRES, [0.0; 2]));
+        let mut points = of(&map, &Plane::new(&Ground::METRES, [0.0; 2]));
         assert_eq!(points.len(), 1);
         let mut point = points.remove(0);
         // By the number of the place, not of the vertex.
@@ -168,6 +166,6 @@ mod tests {
     fn a_feature_without_an_area_has_no_centroid() {
         let flat = MapData::of_points(VertexTable::new(vec![[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).unwrap());
         let areas = Areas::new(&[0, 1, 2, 0], &[0], [ChainKind::Shell], &[0]);
-        assert!(of(&MapData { areas, ..flat }, &Plane::new(&METRES, [0.0; 2])).is_empty());
+        assert!(of(&MapData { areas, ..flat }, &Plane::new(&Ground::METRES, [0.0; 2])).is_empty());
     }
 }

@@ -187,7 +187,6 @@ mod tests {
         options::Rigidity,
     };
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
     /// The corners of a house; the last one is the first one.
     const HOUSE: [[f64; 2]; 6] = [[0.0, 0.0], [14.0, 0.0], [14.0, 9.0], [6.0, 12.0], [0.0, 9.0], [0.0, 0.0]];
 
@@ -253,7 +252,7 @@ mod tests {
     /// the key of the tests.
     fn seen(copy: u8, shape: Rigidity, altered: impl Fn(&[[f64; 2]]) -> MapData) -> Seen {
         let (town, indices) = town();
-        let map = town.on(METRES, None);
+        let map = town.on(&Ground::METRES, &Ground::METRES);
         let (key, parameters) =
             (SecretKey::from_bytes([7; 32]), Parameters { shape, ..Parameters::default() });
         let message = Message::from_hex("00112233445566778899aabbccddeeff").unwrap();
@@ -262,8 +261,8 @@ mod tests {
         let houses: Vec<[f64; 2]> = indices.iter().map(|&vertex| marked.coords[vertex as usize]).collect();
         let suspect = altered(&houses);
         let reference = Reference::new(&town, &map, 128, &parameters).unwrap();
-        let maps = maps_of_features(&town, &METRES, &suspect).unwrap();
-        let onto = |map| Registrar::new(map, &METRES, 1.0).register(&suspect, Start::Auto);
+        let maps = maps_of_features(&town, &Ground::METRES, &suspect).unwrap();
+        let onto = |map| Registrar::new(map, &Ground::METRES, 1.0).register(&suspect, Start::Auto);
         let registration = maps.iter().map(onto).find(Registration::agrees).unwrap();
         let matched = Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData);
         assert!(!matched.is_chance(Demodulator::Joint));
@@ -319,7 +318,7 @@ mod tests {
     #[test]
     fn points_of_another_place_and_few_points_are_no_features() {
         let (town, indices) = town();
-        let map = town.on(METRES, None);
+        let map = town.on(&Ground::METRES, &Ground::METRES);
         let reference = Reference::new(&town, &map, 128, &Parameters::default()).unwrap();
         let anywhere = |i: usize| [(i * 7919 % 60_101) as f64 / 100.0, (i * 104_729 % 60_013) as f64 / 100.0];
         let houses: Vec<[f64; 2]> =
@@ -327,7 +326,7 @@ mod tests {
         let few = centroids(&houses[..20 * HOUSE.len()]).vertices.coords().to_vec();
         for places in [(0..500).map(anywhere).collect(), few] {
             let suspect = MapData::of_points(VertexTable::new(places).unwrap());
-            let registration = Registrar::new(&town, &METRES, 1.0).as_it_stands(&suspect);
+            let registration = Registrar::new(&town, &Ground::METRES, 1.0).as_it_stands(&suspect);
             let matched = Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData);
             assert_eq!(shown(&matched).count(), 0);
         }

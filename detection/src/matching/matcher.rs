@@ -148,13 +148,11 @@ impl<'a> Near<'a> {
 mod tests {
     use super::*;
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     #[test]
     fn t_is_a_radius_and_one_suspect_vertex_serves_one_reference_vertex() {
         let reference = [[0.0, 0.0], [0.6, 0.0], [10.0, 0.0], [20.0, 0.0]];
         let suspect = [[0.5, 0.0], [10.0, 0.99], [20.0, 1.01]];
-        let matches = Matcher::new(&reference, &METRES, [10.0, 0.0]).all(&suspect, 1.0);
+        let matches = Matcher::new(&reference, &Ground::METRES, [10.0, 0.0]).all(&suspect, 1.0);
         assert_eq!(matches.suspect_of, [None, Some(0), Some(1), None]);
         assert_eq!(matches.count, 2);
     }
@@ -176,7 +174,7 @@ mod tests {
         let heap = (0..200_000).map(|i| [10.2 + f64::from(i) * 1e-7, 10.3 + f64::from(i % 317) * 1e-7]);
         let few: Vec<[f64; 2]> = reference.iter().map(|p| [p[0] + 0.1, p[1] - 0.05]).collect();
         let all: Vec<[f64; 2]> = few.iter().copied().chain(heap).collect();
-        let matcher = Matcher::new(&reference, &METRES, [10.0, 10.0]);
+        let matcher = Matcher::new(&reference, &Ground::METRES, [10.0, 10.0]);
         assert_eq!(matcher.all(&all, 6.0).suspect_of, matcher.all(&few, 6.0).suspect_of);
     }
 }

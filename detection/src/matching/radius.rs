@@ -100,8 +100,6 @@ mod tests {
     use super::*;
     use meshmark_core::ground::Ground;
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     /// Returns a number from −1 to 1 that looks random.
     fn random(i: usize) -> f64 {
         ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / 2f64.powi(52) - 1.0
@@ -117,7 +115,7 @@ mod tests {
         let each = reference.iter().enumerate();
         let moved: Vec<[f64; 2]> =
             each.map(|(i, p)| [0, 1].map(|axis| p[axis] + noise(i) * random(5001 + 2 * i + axis))).collect();
-        let matcher = Matcher::new(&reference, &METRES, [100.0, 100.0]);
+        let matcher = Matcher::new(&reference, &Ground::METRES, [100.0, 100.0]);
         RadiusChoice::FromData.choose(&matcher, &moved, [1.0, 1.0])
     }
 
@@ -129,7 +127,7 @@ mod tests {
         assert_eq!(chosen(1.8, 1), Radius { metres: 2.0, reason: RadiusReason::Noise });
         assert_eq!(chosen(2.5, 60), Radius { metres: 1.0, reason: RadiusReason::Least });
         let given = RadiusChoice::Given(0.4);
-        let matcher = Matcher::new(&[[0.0; 2]], &METRES, [0.0; 2]);
+        let matcher = Matcher::new(&[[0.0; 2]], &Ground::METRES, [0.0; 2]);
         let found = given.choose(&matcher, &[[3.0; 2]], [1.0; 2]);
         assert_eq!(found, Radius { metres: 0.4, reason: RadiusReason::Given });
     }

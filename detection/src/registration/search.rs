@@ -387,8 +387,6 @@ mod tests {
         rand_core::{Rng, SeedableRng},
     };
 
-    const METRES: Ground = Ground::Plane { metres_per_unit: 1.0 };
-
     fn label(value: &str, point: [f64; 2]) -> Label {
         Label { value: value.into(), point, dimension: Dimension::Area }
     }
@@ -419,7 +417,7 @@ mod tests {
         let theirs: Vec<Label> = labels.iter().enumerate().map(moved).collect();
         let ours = MapData { labels, ..MapData::of_points(reference) };
         let theirs = MapData { labels: theirs, ..MapData::of_points(suspect) };
-        let found = Registrar::new(&ours, &METRES, 1.0).register(&theirs, Start::Auto);
+        let found = Registrar::new(&ours, &Ground::METRES, 1.0).register(&theirs, Start::Auto);
         assert_eq!((found.method, found.landmarks), (Method::Landmarks, 30));
         assert!(found.rms_m.unwrap() < 1e-6, "{found:?}");
     }
@@ -430,7 +428,7 @@ mod tests {
         let moved = reference.coords().iter().map(|p| [p[0] + 0.3, p[1] - 0.2]).collect();
         let suspect = VertexTable::new(moved).unwrap();
         let (reference, suspect) = (MapData::of_points(reference), MapData::of_points(suspect));
-        let found = Registrar::new(&reference, &METRES, 1.0).register(&suspect, Start::Auto);
+        let found = Registrar::new(&reference, &Ground::METRES, 1.0).register(&suspect, Start::Auto);
         assert_eq!(found.method, Method::Identity);
         assert!(found.rms_m.unwrap() < 1e-6, "{found:?}");
     }

@@ -8,7 +8,6 @@ use crate::{
     product::{Asked, Marking, Product, Profile, Report, write_key},
 };
 use cases::{Case, INNOCENTS, Table, all};
-use meshmark_core::ground::Ground;
 use meshmark_dataset::{Selection, survey};
 use serde::Serialize;
 use std::{
@@ -330,10 +329,12 @@ fn outcome(
 /// Fails unless a map is in metres, as the lengths of the attacks are.
 fn check_metres(path: &Path) -> Result<()> {
     let dataset = gdal::Dataset::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let ground = survey(&dataset, &Selection::default()).and_then(|survey| survey.ground());
-    match ground.map_err(|e| format!("{}: {e}", path.display()))? {
-        Ground::Plane { metres_per_unit } if (metres_per_unit - 1.0).abs() < 0.01 => Ok(()),
-        _ => Err(format!("{} is not in metres: reproject it first", path.display()).into()),
+    let unit_m = survey(&dataset, &Selection::default())
+        .and_then(|survey| Ok(survey.measure()?.metres_per_unit(survey.data.vertices.centre())))
+        .map_err(|e| format!("{}: {e}", path.display()))?;
+    match unit_m.iter().all(|metres| (metres - 1.0).abs() < 0.01) {
+        true => Ok(()),
+        false => Err(format!("{} is not in metres: reproject it first", path.display()).into()),
     }
 }
 

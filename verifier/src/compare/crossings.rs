@@ -1,6 +1,6 @@
 //! Crossings of segments before and after marking.
 
-use meshmark_core::{orientation::orientation, scale::Measure};
+use meshmark_core::{ground::Ground, orientation::orientation};
 use rayon::prelude::*;
 use rstar::{
     AABB, RTree, RTreeObject,
@@ -33,7 +33,7 @@ pub(super) fn crossings(
     segments: &[[u32; 2]],
     before: &[[f64; 2]],
     after: &[[f64; 2]],
-    measure: &Measure,
+    measure: &Ground,
 ) -> (Crossings, Vec<[f64; 2]>) {
     let (old, new) = (crossing_pairs(segments, before), crossing_pairs(segments, after));
     let is_deep = |[i, j]: &[u32; 2], coords: &[[f64; 2]]| {
@@ -76,7 +76,7 @@ fn cross([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
 
 /// Returns the distance of the nearest of the four ends of two crossing segments from the line of
 /// the other segment, metres.
-fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], measure: &Measure) -> f64 {
+fn depth_m([[a, b], [c, d]]: [[[f64; 2]; 2]; 2], measure: &Ground) -> f64 {
     let height = |a: [f64; 2], b: [f64; 2], p: [f64; 2]| {
         let ([ex, ey], [px, py]) = (measure.metres_between(a, b), measure.metres_between(a, p));
         (ex * py - ey * px).abs() / ex.hypot(ey)

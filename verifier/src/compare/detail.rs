@@ -9,7 +9,7 @@ use crate::{
     report::Extent,
     thinning::{ARROWS, BINS, PointGrid, extent_of, lines},
 };
-use meshmark_core::{distortion::Corner, scale::Measure, vertices::VertexTable};
+use meshmark_core::{distortion::Corner, ground::Ground, vertices::VertexTable};
 use meshmark_detection::Histogram;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
@@ -87,7 +87,7 @@ impl ComparedFiles {
 pub(super) struct Findings<'a> {
     pub vertices: &'a VertexTable,
     pub moved: &'a [[f64; 2]],
-    pub measure: &'a Measure<'a>,
+    pub measure: &'a Ground,
     pub segments: &'a [[u32; 2]],
     pub corners: &'a [Corner],
     /// Places of torn vertices, new invalid geometries, new overlaps and changed crossings, CRS
@@ -97,7 +97,7 @@ pub(super) struct Findings<'a> {
 
 impl Findings<'_> {
     pub fn detail(self) -> Detail {
-        let (coords, extent) = (self.vertices.coords(), extent_of(self.vertices, &self.measure.ground));
+        let (coords, extent) = (self.vertices.coords(), extent_of(self.vertices, self.measure));
         let pairs = coords.iter().zip(self.moved);
         let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.measure.metres_between(*a, *b)).collect();
         let lengths: Vec<f64> = displacements.iter().map(|[x, y]| x.hypot(*y)).collect();

@@ -13,8 +13,8 @@ use crate::{Error, Result, inputs::maps};
 use detail::{Detail, Findings};
 use meshmark_core::{
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
+    ground::Ground,
     map::Map,
-    scale::Measure,
     vertices::VertexTable,
 };
 use meshmark_dataset::{
@@ -66,7 +66,7 @@ const MOST_AWAY_M: f64 = 100.0;
 /// Two maps, paired feature by feature.
 pub(crate) struct Pairs<'a> {
     pub features: Vec<Pair>,
-    pub measure: Measure<'a>,
+    pub measure: &'a Ground,
     /// Cell size of the grid of the marked map, CRS units; 0 without a grid.
     pub grid: f64,
 }
@@ -89,8 +89,7 @@ pub fn compare(
     precision: Option<f64>,
     detailed: bool,
 ) -> Result<Comparison> {
-    let (ground, lattice) = maps::scales(reference, layers)?;
-    let measure = Measure { ground, lattice: lattice.as_ref() };
+    let measure = &maps::ground(reference, layers)?;
     let (before, own) = maps::geometries("reference", reference, layers)?;
     let (after, other) = maps::geometries("marked map", marked, layers)?;
     if before.len() != after.len() {
@@ -133,12 +132,11 @@ impl Pairs<'_> {
         }
         let moved: Vec<[f64; 2]> = moved.into_iter().map(|to| to.expect("every vertex occurs")).collect();
         let segments = self.segments(&indices);
-        let Measure { ground, lattice } = self.measure;
-        let map = Map { segments: &segments, lattice, ..Map::of_points(&vertices, ground) };
+        let map = Map { segments: &segments, ..Map::of_points(&vertices, self.measure) };
         let corners = Corner::all(&map, &moved);
         let Quality { areas, hausdorff, validity, overlaps, newly_invalid, newly_overlapping } =
             self.quality();
-        let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, &self.measure);
+        let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, self.measure);
         let detail = detailed.then(|| {
             let torn = vertices.coords().iter().zip(&torn).filter(|(_, torn)| **torn);
             let place = |number: &u32| self.features[*number as usize].before.first();
@@ -147,7 +145,7 @@ impl Pairs<'_> {
             Findings {
                 vertices: &vertices,
                 moved: &moved,
-                measure: &self.measure,
+                measure: self.measure,
                 segments: &segments,
                 corners: &corners,
                 places: [torn.map(|(at, _)| *at).collect(), invalid, overlapping, crossing],
@@ -161,7 +159,7 @@ impl Pairs<'_> {
                 vertices: vertices.len(),
                 torn_vertices: torn.into_iter().filter(|torn| *torn).count(),
             },
-            displacement: Displacement::between(&vertices, &moved, &self.measure),
+            displacement: Displacement::between(&vertices, &moved, self.measure),
             hausdorff,
             angles: AngleChange::at(&corners),
             areas,

@@ -112,8 +112,8 @@ fn run(
 ) -> Result<()> {
     let DistributeRequest { key, options, folder, .. } = request;
     let of_map = |error| maps::failed("map", &request.map, error);
-    let map = survey.map().map_err(of_map)?;
     let parameters = &options.parameters;
+    let map = survey.map(parameters).map_err(of_map)?;
     marking::check_extent(&map, parameters).map_err(of_map)?;
     marking::check_scale(&map, survey.crs.as_ref()).map_err(of_map)?;
     let threads = threads();

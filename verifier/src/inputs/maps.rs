@@ -11,7 +11,6 @@ use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{
     ground::Ground,
     options::{Options, Spelling},
-    scale::ScaleLattice,
 };
 use meshmark_dataset::{
     CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, features, marked_view,
@@ -105,10 +104,10 @@ pub(super) fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
 }
 
 /// Returns the ground metric of the reference of a comparison.
-pub fn scales(path: &Path, layers: Option<&[String]>) -> Result<(Ground, Option<ScaleLattice>)> {
+pub fn ground(path: &Path, layers: Option<&[String]>) -> Result<Ground> {
     let survey =
         reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
-    survey.into_scales().map_err(|error| Error::Unmeasured {
+    survey.measure().cloned().map_err(|error| Error::Unmeasured {
         what: "reference",
         path: path.into(),
         source: Box::new(error),

@@ -126,7 +126,7 @@ pub fn examine(
 ) -> Result<Suited<Examination>> {
     let unfit =
         |source| Suited::No(Error::Unfit { path: request.reference.clone(), source: Box::new(source) });
-    let map = match reference.map() {
+    let map = match reference.map(&request.parameters) {
         Ok(map) => map,
         Err(error) => return Ok(unfit(error)),
     };
