@@ -80,3 +80,33 @@ fn the_record_of_an_export_has_the_digests_of_reference_and_copy() {
     assert_eq!(record["copy"]["file_sha256"], digest("out.gpkg").as_str());
     host.matches("ref.gpkg", &["--record", "record.json", "out.gpkg"]);
 }
+
+#[test]
+fn every_owner_is_found_in_a_map_that_was_taken_and_marked_again_three_times() {
+    let host = Host::new();
+    host.copy("kotka.gpkg", "0.gpkg");
+    let owners = ["the first", "a thief", "a second thief", "a third thief"];
+    let command = host.meshmark();
+    let command = command.to_str().unwrap();
+    for (number, owner) in owners.iter().enumerate() {
+        host.run(command, &["keygen", &format!("{number}.json")]).succeeds();
+        let options = [
+            format!("KEY={number}.json"),
+            format!("RECIPIENT=the customer of {owner}"),
+            format!("RECORD={number}-record.json"),
+        ];
+        let options = options.each_ref().map(|option| ["-oo", option.as_str()]);
+        let (source, copy) = (format!("MESHMARK:{number}.gpkg"), format!("{}.gpkg", number + 1));
+        let files = ["-f", "GPKG", copy.as_str(), source.as_str()];
+        host.run("ogr2ogr", &[&files[..], options.as_flattened()].concat()).succeeds();
+    }
+    for (number, owner) in owners.iter().enumerate() {
+        let [key, record] = [format!("{number}.json"), format!("{number}-record.json")];
+        let reference = format!("{number}.gpkg");
+        let of_owner = ["--key", &key, "--reference", &reference, "--record", &record, "4.gpkg"];
+        let run = host.run(command, &[&["verify", "--json"][..], &of_owner].concat());
+        let report: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(run.code, Some(0), "{owner}: {}", run.stdout);
+        assert!(report["p_value_log10"].as_f64().unwrap() < -12.0, "{owner}: {}", report["p_value_log10"]);
+    }
+}
