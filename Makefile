@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 false-alarms faults quality conformance hosts newcomer qgis plugin-for-wheel deb install \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -63,6 +63,11 @@ table2: build
 quality: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin quality
 	$(BUILD)/quality $(or $(MAPS),$(wildcard ../shared/maps/dev/*.gpkg ../shared/maps/variety/*.gpkg),$(FIXTURES))
+
+# Who is named when recipients mix their copies; about an hour for the nine maps of docs/security.md.
+coalitions: build
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin coalitions
+	$(BUILD)/coalitions --out target/coalitions $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # p-values of wrong keys and wrong recipients.
 false-alarms: build

@@ -2,7 +2,7 @@
 //! all of them.
 
 use meshmark_host_tests::{
-    attacks::{Map, collusion},
+    attacks::{Map, collusion::Mixture},
     plugin::Host,
 };
 use serde_json::Value;
@@ -48,7 +48,7 @@ fn a_copy_names_its_recipient_and_an_average_all_members() {
     let (run, report) = host.verify("map.gpkg", &["--records", "records", "0.gpkg"]);
     assert_eq!((run.code, matching(&report)), (Some(0), vec!["ACME GmbH"]), "{}", run.stdout);
     let members: Vec<Map> = (0..3).map(|n| Map::read(&host.path(&format!("{n}.gpkg"))).unwrap()).collect();
-    collusion::average(&members).unwrap().write(&host.path("average.gpkg")).unwrap();
+    Mixture::Average.of(&members, 1).unwrap().write(&host.path("average.gpkg")).unwrap();
     let (run, report) = host.verify("map.gpkg", &["--records", "records", "average.gpkg"]);
     assert_eq!((run.code, matching(&report)), (Some(0), RECIPIENTS[..3].to_vec()), "{}", run.stdout);
     assert_eq!(report["candidates"]["tried"], 4);

@@ -4,7 +4,7 @@ pub mod cases;
 
 use crate::{
     Result,
-    attacks::{Map, OtherMaps, collusion, noise, similarity},
+    attacks::{Map, OtherMaps, collusion::Mixture, noise, similarity},
     product::{Asked, Marking, Product, Profile, Report, write_key},
 };
 use cases::{Case, INNOCENTS, Table, all};
@@ -259,7 +259,7 @@ impl Lab<'_> {
             Case::Collusion { copies } => {
                 let colluders = &sheet.copies[..*copies];
                 let maps = colluders.iter().map(|copy| Map::read(&copy.path)).collect::<Result<Vec<_>>>()?;
-                collusion::average(&maps)?.write(suspect)?;
+                Mixture::Average.of(&maps, seed)?.write(suspect)?;
                 let innocent = |i| self.question(sheet, &format!("innocent {i}"), false, None);
                 Ok(colluders.iter().map(guilty).chain((1..=INNOCENTS).map(innocent)).collect())
             }
