@@ -62,6 +62,7 @@ pub mod map_data;
 pub mod mesh;
 pub mod message;
 pub mod modulation;
+pub mod mosaic;
 mod motion;
 mod nearness;
 pub mod noise_law;

@@ -184,6 +184,25 @@ impl Response {
         Response::Coupled(blocks)
     }
 
+    /// Returns the displacements of all rows along x, then along y, by every unit coefficient of
+    /// axis x, then of axis y.
+    pub fn columns_of_coordinates(&self) -> Vec<Vec<f64>> {
+        let of = |coefficients: usize, i: usize| {
+            let of_axis = |axis: usize| -> Vec<f64> {
+                match self {
+                    Response::Separate(block) if axis == coefficients => {
+                        block.col(i).iter().copied().collect()
+                    }
+                    Response::Separate(block) => vec![0.0; block.nrows()],
+                    Response::Coupled(blocks) => blocks[axis][coefficients].col(i).iter().copied().collect(),
+                }
+            };
+            [of_axis(0), of_axis(1)].concat()
+        };
+        let columns = self.columns();
+        (0..2).flat_map(|axis| (0..columns).map(move |i| (axis, i))).map(|(axis, i)| of(axis, i)).collect()
+    }
+
     fn columns(&self) -> usize {
         match self {
             Response::Separate(block) => block.ncols(),

@@ -14,6 +14,7 @@ use meshmark_core::{
     map_data::{ChainKind, MapData},
     message::Message,
     modulation::{SpreadMessage, displacements_m},
+    mosaic::wealth_log10,
     options::{Parameters, Rigidity},
     part::PartDigest,
     patches::Patches,
@@ -203,5 +204,47 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
     for (number, attempt) in attempts.into_iter().enumerate() {
         let (_, fingerprint) = score_of_b(attempt);
         assert!(fingerprint.abs() < 5.0, "attempt {number}: {fingerprint}");
+    }
+}
+
+/// Returns log₁₀ of the wealth of bets on members, who have a copy each, and on as many others, for
+/// mixtures of the copies of members.
+fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)> {
+    let town = town();
+    let map = town.on(&Ground::METRES, &Ground::METRES);
+    let (key, part, parameters) = (key(), PartDigest::of(&town.vertices), Parameters::of_fingerprint());
+    let copy =
+        |n: usize| embed(&map, &key, &format!("member {n}"), COEFFICIENTS, &parameters).unwrap().coords;
+    let copies: Vec<Vec<[f64; 2]>> = (0..members).map(copy).collect();
+    let names = (0..members).map(|n| format!("member {n}")).chain((0..others).map(|n| format!("other {n}")));
+    let signs: Vec<_> = names.map(|name| recipient_signs(&key, &part, &name)).collect();
+    let patches = Patches::new(&map, &parameters).unwrap();
+    let owner = |n: usize| n * 7919 % 101 % members;
+    let least = |v: usize| [0, 1].map(|a| copies.iter().map(|copy| copy[v][a]).fold(f64::MAX, f64::min));
+    let vertices = 0..town.vertices.coords().len();
+    let mixtures: [(&str, Vec<[f64; 2]>); 3] = [
+        ("the least values", vertices.clone().map(least).collect()),
+        ("a mosaic of vertices", vertices.clone().map(|v| copies[owner(v)][v]).collect()),
+        ("a mosaic of pieces", vertices.map(|v| copies[owner(v / 20)][v]).collect()),
+    ];
+    let bet = |(name, suspect): (&'static str, Vec<[f64; 2]>)| {
+        let observed = displaced(&town, &suspect);
+        let pilots = pilots(&key, &part);
+        let wealth =
+            wealth_log10(&patches, &[&observed], COEFFICIENTS, &parameters, &pilots, &signs).unwrap();
+        (name, wealth[..members].to_vec(), wealth[members..].to_vec())
+    };
+    mixtures.into_iter().map(bet).collect()
+}
+
+#[test]
+fn every_member_of_a_mosaic_wins_and_the_others_win_no_more_often_than_they_may() {
+    for (mixture, members, others) in bets(8, 150) {
+        assert!(members.iter().all(|wealth| *wealth > 12.0), "{mixture}: {members:?}");
+        // A wealth of w comes with a probability of at most 1 / w; the bounds have p < 10⁻⁶.
+        let above = |wealth: f64| others.iter().filter(|other| **other >= wealth).count();
+        assert!(above(0.5) <= 80 && above(1.0) <= 40 && above(4.0) == 0, "{mixture}: {others:?}");
+        let mean = others.iter().map(|wealth| 10f64.powf(*wealth)).sum::<f64>() / others.len() as f64;
+        assert!(mean < 10.0, "{mixture}: {mean}");
     }
 }

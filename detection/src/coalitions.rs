@@ -12,8 +12,8 @@ use crate::{
     matched::Matched,
 };
 use meshmark_core::{
-    Result, agreement::Evidence, fingerprint::Fingerprint, modulation::displacements_m, options::Parameters,
-    signs::Sequence,
+    Result, agreement::Evidence, fingerprint::Fingerprint, modulation::displacements_m, mosaic,
+    options::Parameters, signs::Sequence,
 };
 
 /// A vertex this near to its place in a copy is that of the copy, metres. Those of other copies are
@@ -23,6 +23,8 @@ const SAME_M: f64 = 0.01;
 const LEAST_OWN: f64 = 0.01;
 /// Where the noise is larger, no vertex shows whose it is, metres.
 const MOST_NOISE_M: f64 = 0.1;
+/// So many recipients and patches are bet on in about half a minute.
+const MOST_BETS: usize = 8000;
 /// Named recipients that leave less than this share of the energy explain the suspect.
 const LEAST_REST: f64 = 0.1;
 
@@ -57,6 +59,40 @@ impl Matched<'_> {
                 self.estimates(self.vertices(), &observed, &seen.disturbance, parameters, &|_| ())?;
             Ok(Evidence::of_recipients(&estimates).without(&named))
         })
+    }
+
+    /// Bets on the signs of candidates that are not named, where a share of the coordinates may be
+    /// theirs: those with the best scores, as many as a minute allows. The suspect is seen as it
+    /// stands and as it is registered: the least values of many copies shift a map as a whole,
+    /// which the registration undoes. No deformation is taken out, as that of polygon groups has
+    /// much of what the owners of single features put there.
+    ///
+    /// # Errors
+    /// Fails when a patch cannot be solved.
+    pub fn bet_on_shares(
+        &self,
+        seen: &Estimated,
+        candidates: &[Fingerprint],
+        pilots: &Sequence,
+        parameters: &Parameters,
+        tried: (usize, f64),
+        standings: &mut [Standing],
+    ) -> Result<()> {
+        if seen.observations.is_of_features() {
+            return Ok(());
+        }
+        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
+        let mut chosen: Vec<usize> = (0..standings.len()).filter(|&k| !standings[k].is_named).collect();
+        chosen.sort_by(|&a, &b| standings[b].score.total_cmp(&standings[a].score).then(a.cmp(&b)));
+        chosen.truncate((MOST_BETS / patches.as_slice().len()).max(1));
+        let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own).collect();
+        let (reference, suspect) = (self.reference.data.vertices.coords(), self.suspect.vertices.coords());
+        let views = [suspect, &self.moved]
+            .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
+        let views = views.each_ref().map(Vec::as_slice);
+        let wealth = mosaic::wealth_log10(patches, &views, coefficients, parameters, pilots, &signs)?;
+        chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, tried));
+        Ok(())
     }
 
     /// Forgets the vertices that lie where the copies of some recipients have them.

@@ -55,6 +55,18 @@ fn a_copy_names_its_recipient_and_an_average_all_members() {
 }
 
 #[test]
+fn every_mixture_of_copies_names_its_members_and_nobody_else() {
+    let host = copies();
+    let members: Vec<Map> = (0..3).map(|n| Map::read(&host.path(&format!("{n}.gpkg"))).unwrap()).collect();
+    for (mixture, name) in Mixture::ALL {
+        let suspect = format!("{name}.gpkg");
+        mixture.of(&members, 1).unwrap().write(&host.path(&suspect)).unwrap();
+        let (run, report) = host.verify("map.gpkg", &["--records", "records", &suspect]);
+        assert_eq!((run.code, matching(&report)), (Some(0), RECIPIENTS[..3].to_vec()), "{name}: {}", run.stdout);
+    }
+}
+
+#[test]
 fn records_of_both_versions_are_tried_together() {
     let host = copies();
     let options = ["-oo", "CODE=LDPC", "-oo", "RECORD=records/message.json"];

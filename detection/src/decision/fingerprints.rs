@@ -21,6 +21,8 @@ pub struct Grounds {
     significance: f64,
     /// Whether a mark of the key shows and is weaker than that of one copy.
     is_mixed: bool,
+    /// Whether the pilots show more of the key than chance usually does.
+    may_have_key: bool,
     /// log₁₀ of the probability that the copy of one recipient has a score below the one needed, or
     /// the least that is stated.
     missed_log10: f64,
@@ -60,15 +62,25 @@ impl Grounds {
             true => survival::normal_log10(lack).max(LEAST_MISSED_LOG10),
             false => LEAST_MISSED_LOG10,
         };
-        Grounds { significance, is_mixed, missed_log10 }
+        let may_have_key = p_log10(pilot_score) < SUSPICIOUS_LOG10;
+        Grounds { significance, is_mixed, may_have_key, missed_log10 }
+    }
+
+    /// Returns whether copies of several recipients may be mixed, so that bets on the shares of those
+    /// who are not named may show more: the signs are weak, or nobody is named.
+    pub fn ask_for_bets(&self, standings: &[Standing]) -> bool {
+        self.is_mixed || self.may_have_key && standings.iter().all(|standing| !standing.is_named)
     }
 
     /// Decides on a recipient.
     pub fn decide(&self, standing: &Standing) -> Answer {
         if standing.is_named {
+            let what = match standing.is_of_share {
+                true => "agree so well with a share of the coordinates",
+                false => "agree so well",
+            };
             let reason = format!(
-                "the probability that the secret signs of a recipient agree so well by chance is below the significance \
-                 of {:e}",
+                "the probability that the secret signs of a recipient {what} by chance is below the significance of {:e}",
                 self.significance
             );
             return Answer { verdict: Verdict::Match, reason, p_missed_log10: None };
@@ -204,7 +216,15 @@ mod tests {
         };
         let standing = |score: f64, p_value_log10: f64| {
             let agreement = evidence.agreement(&signs("B"));
-            Standing { agreement, score, round: 1, p_value_log10, is_named: false }
+            Standing {
+                agreement,
+                score,
+                round: 1,
+                p_alone_log10: p_log10(score),
+                p_value_log10,
+                is_of_share: false,
+                is_named: false,
+            }
         };
         let verdict = |grounds: Grounds, standing| grounds.decide(&standing).verdict;
         assert_eq!(verdict(grounds(1, 1e-6), standing(3.0, -2.4)), Verdict::Inconclusive);

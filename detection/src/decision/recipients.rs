@@ -12,6 +12,9 @@
 //! LNCS 6958, 2011). What remains depends on the suspect and on those taken out alone, so that the
 //! signs of an innocent candidate are independent of it, too. Round m multiplies p by m (m + 1):
 //! the sum of 1 / (m (m + 1)) is 1, so that the significance is that of all rounds together.
+//!
+//! *Whose share?* In a mosaic everybody's share is weak in the sums of all signs, and exact where it
+//! is. The wealth of a gambler who bets on the signs is the evidence then ([`Standing::bet`]).
 
 use super::{any_message, survival};
 use meshmark_core::{
@@ -20,6 +23,10 @@ use meshmark_core::{
     signs::Sequence,
 };
 use rayon::prelude::*;
+
+/// Bets have a hundredth of the error that scores have: their p-value is multiplied by 100, and both
+/// together err by at most 1.01 times the significance.
+const SHARE_OF_SCORES_LOG10: f64 = 2.0;
 
 /// More rounds name nobody else: every round needs stronger evidence.
 const MOST_ROUNDS: usize = 20;
@@ -49,9 +56,12 @@ pub struct Standing {
     pub score: f64,
     /// The round of the smallest p-value, counted from 1: how often others were taken out, and 1.
     pub round: usize,
-    /// log₁₀ of the smallest p-value of all rounds, times the number of candidates and the factor of
-    /// the round.
+    /// log₁₀ of the smallest p-value of all rounds, or of the bets, alone.
+    pub p_alone_log10: f64,
+    /// log₁₀ of this p-value times the number of candidates and the factor of the round.
     pub p_value_log10: f64,
+    /// Whether it is that of bets on a share of the coordinates, see [`meshmark_core::mosaic`].
+    pub is_of_share: bool,
     /// Whether this p-value is below the significance.
     pub is_named: bool,
 }
@@ -82,7 +92,9 @@ pub fn name_in_rounds(
         let agreement = evidence.agreement(signs);
         let p_value_log10 = p_value_log10(agreement.score, 1, tried);
         let is_named = p_value_log10 < significance.log10();
-        Standing { agreement, score: agreement.score, round: 1, p_value_log10, is_named }
+        let p_alone_log10 = p_log10(agreement.score).min(0.0);
+        let (score, round, is_of_share) = (agreement.score, 1, false);
+        Standing { agreement, score, round, p_alone_log10, p_value_log10, is_of_share, is_named }
     };
     let mut standings: Vec<Standing> = candidates.par_iter().map(first).collect();
     let (mut named, mut round) = (Vec::new(), 1);
@@ -100,13 +112,27 @@ pub fn name_in_rounds(
             let p_value_log10 = p_value_log10(score, round, tried);
             if p_value_log10 < standing.p_value_log10 {
                 let is_named = p_value_log10 < significance.log10();
-                *standing = Standing { score, round, p_value_log10, is_named, ..*standing };
+                let p_alone_log10 = p_log10(score).min(0.0);
+                *standing = Standing { score, round, p_alone_log10, p_value_log10, is_named, ..*standing };
             }
         };
         let others = standings.par_iter_mut().zip(candidates).filter(|(standing, _)| !standing.is_named);
         others.for_each(again);
     }
     Ok(standings)
+}
+
+impl Standing {
+    /// Takes the wealth of a gambler, log₁₀, for evidence where it is stronger than the score. One
+    /// of the `tried`, whose significance together is this one.
+    pub fn bet(&mut self, wealth_log10: f64, (tried, significance): (usize, f64)) {
+        let p_alone_log10 = (SHARE_OF_SCORES_LOG10 - wealth_log10).min(0.0);
+        let p_value_log10 = (p_alone_log10 + (tried as f64).log10()).min(0.0);
+        if p_value_log10 < self.p_value_log10 {
+            let is_named = p_value_log10 < significance.log10();
+            *self = Standing { p_alone_log10, p_value_log10, is_of_share: true, is_named, ..*self };
+        }
+    }
 }
 
 /// Returns log₁₀ of the p-value of a score in a round among so many candidates.

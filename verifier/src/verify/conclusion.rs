@@ -12,7 +12,7 @@ use crate::report::{
 use meshmark_core::{carrier::Carrier, fingerprint_record::FingerprintShape, message::Message};
 use meshmark_detection::{
     Demodulator,
-    decision::{Decision, Decoys, Verdict, p_any_message_log10, recipients::p_log10},
+    decision::{Decision, Decoys, Verdict, p_any_message_log10},
 };
 use std::collections::BTreeMap;
 
@@ -100,7 +100,7 @@ pub fn conclude_fingerprint(
     };
     Report {
         p_value_log10: Some(standing.p_value_log10),
-        p_recipient_log10: Some(p_log10(standing.score).min(0.0)),
+        p_recipient_log10: Some(standing.p_alone_log10),
         p_missed_log10: answer.p_missed_log10,
         fingerprint: Some(fingerprint),
         ..report(request, seen, (answer.verdict, answer.reason.clone()), seconds, &|_| scores.clone())

@@ -117,11 +117,21 @@ fn of_fingerprints(
     let seen = progress.listen(|listener| matched.estimate(parameters, listener))?;
     let power =
         progress.listen(|listener| Power::of_fingerprint(matched, &seen, &pilots, parameters, listener))?;
-    let standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
     let of_pilots = Evidence::of_pilots(&seen.estimates);
     let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
     let evidence = Evidence::of_recipients(&seen.estimates);
     let grounds = Grounds::new(&evidence, of_pilots, power, (tried, significance));
+    let mut standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
+    if grounds.ask_for_bets(&standings) {
+        matched.bet_on_shares(
+            &seen,
+            &fingerprints,
+            &pilots,
+            parameters,
+            (tried, significance),
+            &mut standings,
+        )?;
+    }
     let decide = |standing: Standing| (standing, grounds.decide(&standing));
     let recipients = standings.into_iter().map(decide).collect();
     let pilots = seen.key_agreement(&pilots);
