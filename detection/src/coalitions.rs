@@ -23,6 +23,8 @@ const SAME_M: f64 = 0.01;
 const LEAST_OWN: f64 = 0.01;
 /// Where the noise is larger, no vertex shows whose it is, metres.
 const MOST_NOISE_M: f64 = 0.1;
+/// Bets are repeated on what the named recipients left, so often at most.
+const MOST_ROUNDS: usize = 4;
 /// So many recipients and patches are bet on in about half a minute.
 const MOST_BETS: usize = 8000;
 /// Named recipients that leave less than this share of the energy explain the suspect.
@@ -54,7 +56,7 @@ impl Matched<'_> {
                 return Ok(rest);
             }
             let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k]).collect();
-            self.forget(&mut observed, seen, &new, parameters)?;
+            self.forget(&mut observed, &seen.disturbance.displacement_m, &new, parameters)?;
             let estimates =
                 self.estimates(self.vertices(), &observed, &seen.disturbance, parameters, &|_| ())?;
             Ok(Evidence::of_recipients(&estimates).without(&named))
@@ -65,7 +67,8 @@ impl Matched<'_> {
     /// theirs: those with the best scores, as many as a minute allows. The suspect is seen as it
     /// stands and as it is registered: the least values of many copies shift a map as a whole,
     /// which the registration undoes. No deformation is taken out, as that of polygon groups has
-    /// much of what the owners of single features put there.
+    /// much of what the owners of single features put there. Vertices of recipients that are named count
+    /// as not found in the next round.
     ///
     /// # Errors
     /// Fails when a patch cannot be solved.
@@ -81,25 +84,43 @@ impl Matched<'_> {
         if seen.observations.is_of_features() {
             return Ok(());
         }
-        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        let mut chosen: Vec<usize> = (0..standings.len()).filter(|&k| !standings[k].is_named).collect();
-        chosen.sort_by(|&a, &b| standings[b].score.total_cmp(&standings[a].score).then(a.cmp(&b)));
-        chosen.truncate((MOST_BETS / patches.as_slice().len()).max(1));
-        let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own).collect();
         let (reference, suspect) = (self.reference.data.vertices.coords(), self.suspect.vertices.coords());
-        let views = [suspect, &self.moved]
+        let mut views = [suspect, &self.moved]
             .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
-        let views = views.each_ref().map(Vec::as_slice);
-        let wealth = mosaic::wealth_log10(patches, &views, coefficients, parameters, pilots, &signs)?;
-        chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, tried));
+        let still = vec![[0.0; 2]; reference.len()];
+        for round in 1..=MOST_ROUNDS {
+            let chosen = self.chosen(standings);
+            let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own).collect();
+            let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
+            let of_views = views.each_ref().map(Vec::as_slice);
+            let wealth = mosaic::wealth_log10(patches, &of_views, coefficients, parameters, pilots, &signs)?;
+            chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, round, tried));
+            let new = chosen.iter().filter(|&&k| standings[k].is_named).map(|&k| candidates[k]);
+            let new: Vec<Fingerprint> = new.collect();
+            if new.is_empty() || standings.iter().all(|standing| standing.is_named) {
+                break;
+            }
+            for view in &mut views {
+                self.forget(view, &still, &new, parameters)?;
+            }
+        }
         Ok(())
     }
 
-    /// Forgets the vertices that lie where the copies of some recipients have them.
+    /// Returns the candidates on whose signs bets are made, by their scores.
+    fn chosen(&self, standings: &[Standing]) -> Vec<usize> {
+        let mut chosen: Vec<usize> = (0..standings.len()).filter(|&k| !standings[k].is_named).collect();
+        chosen.sort_by(|&a, &b| standings[b].score.total_cmp(&standings[a].score).then(a.cmp(&b)));
+        chosen.truncate((MOST_BETS / self.reference.patches.as_slice().len()).max(1));
+        chosen
+    }
+
+    /// Forgets the vertices that lie where the copies of some recipients have them; the copies are
+    /// displaced by `others_m` besides their marks, metres.
     fn forget(
         &self,
         observed: &mut [Option<[f64; 2]>],
-        seen: &Estimated,
+        others_m: &[[f64; 2]],
         recipients: &[Fingerprint],
         parameters: &Parameters,
     ) -> Result<()> {
@@ -107,7 +128,7 @@ impl Matched<'_> {
         let found = observed.iter().flatten().count() as f64;
         for copy_m in displacements_m(patches, recipients, coefficients, parameters)? {
             let is_own = |vertex: &usize| {
-                let other_m = seen.disturbance.displacement_m[*vertex];
+                let other_m = others_m[*vertex];
                 let gap = |o: [f64; 2]| [0, 1].map(|axis| o[axis] - other_m[axis] - copy_m[*vertex][axis]);
                 observed[*vertex].map(gap).is_some_and(|[x, y]| x.hypot(y) <= SAME_M)
             };

@@ -62,7 +62,12 @@ fn every_mixture_of_copies_names_its_members_and_nobody_else() {
         let suspect = format!("{name}.gpkg");
         mixture.of(&members, 1).unwrap().write(&host.path(&suspect)).unwrap();
         let (run, report) = host.verify("map.gpkg", &["--records", "records", &suspect]);
-        assert_eq!((run.code, matching(&report)), (Some(0), RECIPIENTS[..3].to_vec()), "{name}: {}", run.stdout);
+        assert_eq!(
+            (run.code, matching(&report)),
+            (Some(0), RECIPIENTS[..3].to_vec()),
+            "{name}: {}",
+            run.stdout
+        );
     }
 }
 

@@ -123,11 +123,12 @@ pub fn name_in_rounds(
 }
 
 impl Standing {
-    /// Takes the wealth of a gambler, log₁₀, for evidence where it is stronger than the score. One
-    /// of the `tried`, whose significance together is this one.
-    pub fn bet(&mut self, wealth_log10: f64, (tried, significance): (usize, f64)) {
+    /// Takes the wealth of a gambler in a round of bets, log₁₀, for evidence where it is stronger than
+    /// the score. One of the `tried`, whose significance together is this one.
+    pub fn bet(&mut self, wealth_log10: f64, round: usize, (tried, significance): (usize, f64)) {
         let p_alone_log10 = (SHARE_OF_SCORES_LOG10 - wealth_log10).min(0.0);
-        let p_value_log10 = (p_alone_log10 + (tried as f64).log10()).min(0.0);
+        let factor_log10 = (tried as f64).log10() + rounds_log10(round, tried);
+        let p_value_log10 = (p_alone_log10 + factor_log10).min(0.0);
         if p_value_log10 < self.p_value_log10 {
             let is_named = p_value_log10 < significance.log10();
             *self = Standing { p_alone_log10, p_value_log10, is_of_share: true, is_named, ..*self };
