@@ -140,7 +140,7 @@ fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, S
     let mut line_at = |position: Option<&csv::Position>| {
         let start = position.map_or(0, |at| at.byte() as usize);
         let empty = text[start..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
-        line += text[counted..start + empty].iter().filter(|byte| **byte == b'\n').count();
+        line += (counted..start + empty).filter(|at| ends_line(text, *at)).count();
         counted = start + empty;
         line
     };
@@ -155,6 +155,14 @@ fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, S
         }
     }
     Ok(rows)
+}
+
+/// Returns whether a line ends with this byte: a line feed, a carriage return, or both in a row.
+fn ends_line(text: &[u8], at: usize) -> bool {
+    match text[at] {
+        b'\n' => at == 0 || text[at - 1] != b'\r',
+        byte => byte == b'\r',
+    }
 }
 
 #[cfg(test)]
@@ -227,6 +235,9 @@ mod tests {
             (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
             (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
             (b"A\n\"B\nC\n", "control character in the recipient of line 2"),
+            (b"A\rB\r\rC,D\r", "2 columns in line 4"),
+            (b"A\r\nB\r\n\r\nC,D\r\n", "2 columns in line 4"),
+            (b"recipient\r\"a\rb\"", "control character in the recipient of line 2"),
             (b"A\0C\0", "control character in the recipient of line 1"),
         ] {
             let (_, found) = parse(text);
