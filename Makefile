@@ -20,7 +20,8 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults quality conformance hosts newcomer qgis plugin-for-wheel deb install \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz sanitizers \
+	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -80,6 +81,14 @@ faults: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bin faults
 	$(BUILD)/faults
 
+# Every fuzz target for so long, side by side: make fuzz SECONDS=600 TARGETS="key record".
+fuzz: deps
+	$(WITH_GDAL) CARGO=$(CARGO) fuzz/run.sh $(or $(SECONDS),60) $(TARGETS)
+
+# The driver under AddressSanitizer, UndefinedBehaviorSanitizer and valgrind.
+sanitizers: build
+	$(WITH_GDAL) CARGO=$(CARGO) host-tests/sanitizers.sh
+
 conformance: build
 	host-tests/conformance/run.sh
 
@@ -136,6 +145,7 @@ uninstall:
 
 lint: deps
 	$(CARGO) fmt --all -- --check
+	$(CARGO) fmt --manifest-path fuzz/Cargo.toml -- --check
 	$(WITH_GDAL) $(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 	$(WITH_GDAL) $(CARGO) test --release --locked -p meshmark-host-tests --test architecture
 

@@ -239,7 +239,8 @@ fn groups(map: &Map) -> Vec<u32> {
 
 /// Splits the vertices by a k-d tree into `parts` leaves of nearly equal size. Each set is cut
 /// across the longer side of its bounding box, in proportion to the leaves on either side. A body
-/// goes to the side of its first vertex.
+/// goes to the side of its first vertex. There are fewer leaves where a body leaves nothing for one
+/// of the sides.
 fn split(points: &[[f64; 2]], constraints: &Constraints, parts: usize) -> Vec<Vec<u32>> {
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     let mut leaves = Vec::with_capacity(parts);
@@ -254,13 +255,27 @@ fn split_set(
     parts: usize,
     leaves: &mut Vec<Vec<u32>>,
 ) {
-    if parts == 1 {
+    let left_parts = parts / 2;
+    let left = if parts == 1 { 0 } else { cut(points, constraints, set, [left_parts, parts]) };
+    if left == 0 || left == set.len() {
         let mut leaf = set.to_vec();
         leaf.sort_unstable();
         return leaves.push(leaf);
     }
+    let (lower, upper) = set.split_at_mut(left);
+    split_set(points, constraints, lower, left_parts, leaves);
+    split_set(points, constraints, upper, parts - left_parts, leaves);
+}
+
+/// Moves the vertices of `left_parts` of `parts` equal parts of a set to its beginning, and returns
+/// how many these are.
+fn cut(
+    points: &[[f64; 2]],
+    constraints: &Constraints,
+    set: &mut [u32],
+    [left_parts, parts]: [usize; 2],
+) -> usize {
     let axis = longer_side(points, set);
-    let left_parts = parts / 2;
     let left = (set.len() as u64 * left_parts as u64 / parts as u64) as usize;
     let first = |v: u32| {
         constraints.bodies.number_at(v).map_or(v, |body| constraints.bodies.as_slice()[body].members[0])
@@ -273,18 +288,16 @@ fn split_set(
     set.select_nth_unstable_by(left, order);
     // A body is a run in this order: the cut moves before or after the body it meets, whichever is
     // nearer.
-    let cut = first(set[left]);
-    let below = set[..left].iter().filter(|&&v| first(v) == cut).count();
-    let above = set[left..].iter().filter(|&&v| first(v) == cut).count();
+    let met = first(set[left]);
+    let below = set[..left].iter().filter(|&&v| first(v) == met).count();
+    let above = set[left..].iter().filter(|&&v| first(v) == met).count();
     let left = match (below, above) {
         (0, _) => left,
         (below, above) if below > above && left + above < set.len() => left + above,
         (below, _) => left - below,
     };
     set.select_nth_unstable_by(left, order);
-    let (lower, upper) = set.split_at_mut(left);
-    split_set(points, constraints, lower, left_parts, leaves);
-    split_set(points, constraints, upper, parts - left_parts, leaves);
+    left
 }
 
 fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
@@ -441,7 +454,12 @@ fn bridge(patch: &mut Patch, points: &[[f64; 2]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{code::Code, ground::Ground, vertices::VertexTable};
+    use crate::{
+        code::Code,
+        ground::Ground,
+        map_data::{ChainKind, MapData},
+        vertices::VertexTable,
+    };
 
     fn scattered(n: u64) -> VertexTable {
         let hash = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31) % 1_000_003;
@@ -461,6 +479,39 @@ mod tests {
             assert_eq!(cut.as_slice().len(), patches);
             for patch in cut.as_slice() {
                 assert!(patch.vertices.len() >= d && patch.vertices.len() <= n as usize / patches + 2);
+            }
+        }
+    }
+
+    /// Returns a map of closed rings with so many corners each.
+    fn rings(corners: &[u32]) -> MapData {
+        let ring = |(number, &corners): (usize, &u32)| {
+            let corner = move |i: u32| f64::from(i % corners) * std::f64::consts::TAU / f64::from(corners);
+            (0..=corners)
+                .map(move |i| [90.0 * number as f64 + 30.0 * corner(i).cos(), 30.0 * corner(i).sin()])
+        };
+        let coords: Vec<[f64; 2]> = corners.iter().enumerate().flat_map(ring).collect();
+        let starts: Vec<u32> = (0..corners.len())
+            .map(|number| corners[..number].iter().map(|corners| corners + 1).sum())
+            .collect();
+        MapData::from_chains(coords, &starts, vec![ChainKind::Shell; corners.len()]).unwrap().0
+    }
+
+    #[test]
+    fn bodies_larger_than_patches_stay_whole() {
+        let cases: [&[u32]; 5] = [&[40], &[60], &[60, 4], &[4, 60], &[5, 50, 5, 50, 30]];
+        for corners in cases {
+            let data = rings(corners);
+            for shape in [Rigidity::Rigid, Rigidity::Stiff] {
+                let cut = Patches::new(&data.on(METRES, None), &Parameters { shape, ..size(16) }).unwrap();
+                cut.validate().unwrap();
+                assert!(cut.smallest() > 0);
+                let bodies = &cut.constraints().bodies;
+                let patch_of: Vec<u32> = cut.rows().iter().map(|place| place.patch).collect();
+                let is_whole = |members: &[u32]| {
+                    members.iter().all(|&v| patch_of[v as usize] == patch_of[members[0] as usize])
+                };
+                assert!(bodies.as_slice().iter().all(|body| is_whole(&body.members)), "{corners:?}");
             }
         }
     }

@@ -27,7 +27,8 @@ impl<'a> Placement<'a> {
         }
         let scale = self.measure.metres_per_unit(from);
         let wanted_m = (wanted[0] * scale[0]).hypot(wanted[1] * scale[1]);
-        let mut share = 1f64.min(self.tolerance_m / wanted_m);
+        let most = 1f64.min(self.tolerance_m / wanted_m);
+        let (mut share, mut less) = (most, 1e-9);
         loop {
             let target = [0, 1].map(|a| from[a] + share * wanted[a]);
             if let Some(precision) = self.precision {
@@ -36,11 +37,12 @@ impl<'a> Placement<'a> {
             if distance_m(from, target, scale) <= self.tolerance_m {
                 return target;
             }
-            share *= 1.0 - 1e-9; // the sum above was rounded past the tolerance
-            if share < 0.5 {
+            if less > 0.5 {
                 // The last digit of so large a coordinate is worth more than the tolerance.
                 return from;
             }
+            share = most * (1.0 - less); // the sum above was rounded past the tolerance
+            less *= 2.0;
         }
     }
 
@@ -118,6 +120,24 @@ fn check_precision(map: &Map, parameters: &Parameters) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{ground::Ground, vertices::VertexTable};
+
+    #[test]
+    fn every_vertex_moves_to_the_tolerance_or_stays_where_its_last_digit_is_worth_more() {
+        let coords = (0..10_000).map(|i| [385_000.0 + f64::from(i), 6_671_000.0]).collect();
+        let table = VertexTable::new(coords).unwrap();
+        let map = Map::of_points(&table, Ground::Plane { metres_per_unit: 1.0 });
+        for (tolerance_m, moved) in [(1e-12, 0), (1e-7, 10_000), (1e-3, 10_000), (10.0, 10_000)] {
+            let parameters = Parameters { tolerance_m, ..Parameters::default() };
+            let placement = Placement::new(&map, &parameters).unwrap();
+            let places = table.coords().iter().map(|from| (*from, placement.place(*from, [0.7, -0.8])));
+            let found = places.filter(|(from, to)| {
+                assert!(distance_m(*from, *to, [1.0; 2]) <= tolerance_m, "{to:?}");
+                from != to
+            });
+            assert_eq!(found.count(), moved, "{tolerance_m}");
+        }
+    }
 
     #[test]
     fn a_node_is_the_decimal_number_and_never_out_of_reach() {

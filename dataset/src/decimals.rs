@@ -34,6 +34,9 @@ impl fmt::Display for Digits {
 const NOISY_FIGURES: usize = 11;
 const MOST_FIGURES_LEFT_OUT: usize = 3;
 
+/// No number has more decimals, nor more significant figures.
+const MOST_DIGITS: usize = 1074;
+
 impl Digits {
     /// Returns the remedy for too few digits.
     pub fn more(self) -> Option<&'static str> {
@@ -49,10 +52,11 @@ impl Digits {
         let texts = match self {
             Digits::Every => return vec![v],
             Digits::Decimals(count) => {
-                let text = format!("{v:.count$}");
+                let text = format!("{v:.*}", count.min(MOST_DIGITS));
                 without_noise(&text).into_iter().chain([text]).collect::<Vec<_>>()
             }
             Digits::Figures(count) => {
+                let count = count.min(MOST_DIGITS);
                 let text = |count: usize| format!("{v:.*e}", count.max(1) - 1);
                 let is_noisy = ["000000", "999999"].iter().any(|run| text(count).contains(run));
                 let left_out = if count >= NOISY_FIGURES && is_noisy { MOST_FIGURES_LEFT_OUT } else { 0 };
@@ -254,6 +258,17 @@ mod tests {
                     _ => values[0] == x,
                 };
                 prop_assert!(is_it && x == y, "{v:e} with {digits:?} is {x:e}, computed was {values:?}");
+            }
+        }
+
+        #[test]
+        fn digits_beyond_those_of_any_number_are_computed(more in 1074..140_000usize, numbers in prop::collection::vec(numbers(), 1..9)) {
+            for (name, digits) in [("COORDINATE_PRECISION", Digits::Decimals(more)), ("SIGNIFICANT_FIGURES", Digits::Figures(more))] {
+                let options = [(name.to_string(), more.to_string())];
+                prop_assert_eq!(Format::find(Some("GeoJSON"), Path::new("")).unwrap().digits(&options), digits);
+                for (v, [x, _]) in numbers.iter().zip(written("GeoJSON", &options, &numbers)) {
+                    prop_assert!(digits.values(*v).contains(&x), "{v:e} with {digits:?} is {x:e}");
+                }
             }
         }
 

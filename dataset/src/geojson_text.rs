@@ -6,10 +6,13 @@
 //! The text may hold NaN, which a JSON parser refuses, so this module walks it; GDAL has parsed it
 //! before.
 
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 /// GDAL's media type of native data in GeoJSON.
 pub const MEDIA_TYPE: &str = "application/vnd.geo+json";
+
+/// Geometries and coordinates are nested at most this deep; those of GDAL are less.
+const MOST_NESTED: usize = 64;
 
 /// A part of a text, as a range of its bytes.
 #[derive(Debug, PartialEq)]
@@ -24,10 +27,10 @@ pub enum Place {
 /// `None` when it is not an object.
 pub fn places(text: &[u8]) -> Option<Vec<Place>> {
     let mut places = Vec::new();
-    for (key, value) in Text(text).members(0..text.len())? {
-        match key {
+    for Member { key, value, .. } in Text(text).members(0..text.len())? {
+        match &*key {
             b"bbox" => places.push(Place::BoundingBox(value)),
-            b"geometry" => Text(text).places_of_geometry(value, &mut places)?,
+            b"geometry" => Text(text).places_of_geometry(value, 0, &mut places)?,
             _ => {}
         }
     }
@@ -54,21 +57,22 @@ pub fn places(text: &[u8]) -> Option<Vec<Place>> {
 pub fn without_places(text: &[u8], has_json_fields: bool) -> Option<Vec<u8>> {
     let all = Text(text);
     let members = all.members(0..text.len())?;
-    let properties = members.iter().find(|(key, _)| *key == b"properties").map(|(_, value)| value.clone());
+    let properties =
+        members.iter().find(|member| &*member.key == b"properties").map(|member| member.value.clone());
     let attributes = match &properties {
         Some(properties) if has_json_fields => all.numbers_and_booleans(properties.clone()),
         _ => Vec::new(),
     };
     let mut kept = Vec::new();
-    for (key, value) in members {
-        let value = match key {
+    for Member { key, quoted, value } in members {
+        let value = match &*key {
             b"type" | b"properties" => continue,
             b"bbox" => b"null".into(),
-            b"geometry" if all.has_more(&value)? => all.without_places_of_geometry(value)?,
+            b"geometry" if all.has_more(&value, 0)? => all.without_places_of_geometry(value)?,
             b"geometry" => continue,
             _ => text[value].to_vec(),
         };
-        kept.push([b"\"", key, b"\":", &value].concat());
+        kept.push([quoted, b":", &value].concat());
     }
     match properties {
         Some(_) if kept.is_empty() && attributes.is_empty() => return None,
@@ -83,23 +87,39 @@ pub fn without_places(text: &[u8], has_json_fields: bool) -> Option<Vec<u8>> {
 pub fn has_foreign_places(text: &[u8]) -> bool {
     let all = Text(text);
     let Some(members) = all.members(0..text.len()) else { return false };
-    members.into_iter().any(|(key, value)| match key {
+    members.into_iter().any(|Member { key, value, .. }| match &*key {
         b"type" | b"id" | b"bbox" | b"properties" => false,
-        b"geometry" => all.members(value).unwrap_or_default().into_iter().any(|(key, value)| {
-            !matches!(key, b"type" | b"bbox" | b"coordinates" | b"geometries") && names_places(&text[value])
-        }),
+        b"geometry" => {
+            all.members(value).unwrap_or_default().into_iter().any(|Member { key, value, .. }| {
+                !matches!(&*key, b"type" | b"bbox" | b"coordinates" | b"geometries")
+                    && names_places(&text[value])
+            })
+        }
         _ => names_places(&text[value]),
     })
 }
 
-/// Returns whether a text contains a key of places. Quotes inside a string are escaped, so a match
-/// is a key.
+/// Returns whether a text contains a key of places.
 fn names_places(value: &[u8]) -> bool {
-    let has = |key: &[u8]| {
-        let at = value.windows(key.len()).position(|bytes| bytes == key);
-        at.is_some_and(|at| value[at + key.len()..].trim_ascii_start().starts_with(b":"))
-    };
-    has(b"\"coordinates\"") || has(b"\"bbox\"")
+    let (text, mut at) = (Text(value), 0);
+    while let Some(before) = value[at..].iter().position(|byte| *byte == b'"') {
+        let start = at + before;
+        let Some(end) = text.end_of(start) else { return false };
+        let is_key = value.get(text.skip_blanks(end)) == Some(&b':');
+        if is_key && matches!(&*unescaped(&value[start..end]), b"coordinates" | b"bbox") {
+            return true;
+        }
+        at = end;
+    }
+    false
+}
+
+/// Returns a quoted text without quotes and escapes; without quotes alone when it is not UTF-8.
+fn unescaped(quoted: &[u8]) -> Cow<'_, [u8]> {
+    let plain = &quoted[1..quoted.len() - 1];
+    let text = || serde_json::from_slice::<String>(quoted).ok();
+    let decoded = plain.contains(&b'\\').then(text).flatten();
+    decoded.map_or(plain.into(), |text| text.into_bytes().into())
 }
 
 /// Returns the numbers of a position or a bounding box, as written.
@@ -111,18 +131,29 @@ pub fn numbers(list: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// A JSON text; ranges are those of values without surrounding blanks.
 struct Text<'a>(&'a [u8]);
 
+/// A member of an object.
+struct Member<'a> {
+    key: Cow<'a, [u8]>,
+    /// The key as written, with quotes and escapes.
+    quoted: &'a [u8],
+    value: Range<usize>,
+}
+
 impl<'a> Text<'a> {
     /// Returns the keys and values of an object.
-    fn members(&self, object: Range<usize>) -> Option<Vec<(&'a [u8], Range<usize>)>> {
+    fn members(&self, object: Range<usize>) -> Option<Vec<Member<'a>>> {
         let mut members = Vec::new();
         let mut at = self.enter(object, b'{')?;
         while self.0.get(at)? != &b'}' {
-            let key = at..self.end_of(at)?;
-            let colon = self.skip_blanks(key.end);
+            let quoted = &self.0[at..self.end_of(at)?];
+            let colon = self.skip_blanks(at + quoted.len());
+            if !quoted.starts_with(b"\"") || self.0.get(colon)? != &b':' {
+                return None;
+            }
             let value = self.skip_blanks(colon + 1);
             let value = value..self.end_of(value)?;
             at = self.next(value.end);
-            members.push((self.0.get(key.start + 1..key.end - 1)?, value));
+            members.push(Member { key: unescaped(quoted), quoted, value });
         }
         Some(members)
     }
@@ -131,8 +162,8 @@ impl<'a> Text<'a> {
     fn numbers_and_booleans(&self, object: Range<usize>) -> Vec<Vec<u8>> {
         let is_kept = |value: &Range<usize>| !matches!(self.0[value.start], b'"' | b'{' | b'[' | b'n');
         let members = self.members(object).unwrap_or_default().into_iter();
-        let kept = members.filter(|(_, value)| is_kept(value));
-        kept.map(|(key, value)| [b"\"", key, b"\":", &self.0[value]].concat()).collect()
+        let kept = members.filter(|member| is_kept(&member.value));
+        kept.map(|member| [member.quoted, b":", &self.0[member.value]].concat()).collect()
     }
 
     /// Returns the values of an array.
@@ -189,17 +220,26 @@ impl<'a> Text<'a> {
         self.0[value.start] == bracket
     }
 
-    fn places_of_geometry(&self, geometry: Range<usize>, places: &mut Vec<Place>) -> Option<()> {
+    /// Appends the places of a geometry that is in `depth` others; `None` where it is nested too deep.
+    fn places_of_geometry(
+        &self,
+        geometry: Range<usize>,
+        depth: usize,
+        places: &mut Vec<Place>,
+    ) -> Option<()> {
         if !self.is(&geometry, b'{') {
             return Some(());
         }
-        for (key, value) in self.members(geometry)? {
-            match key {
+        if depth > MOST_NESTED {
+            return None;
+        }
+        for Member { key, value, .. } in self.members(geometry)? {
+            match &*key {
                 b"bbox" => places.push(Place::BoundingBox(value)),
-                b"coordinates" => self.positions(value, places)?,
+                b"coordinates" => self.positions(value, 0, places)?,
                 b"geometries" if self.is(&value, b'[') => {
                     for geometry in self.elements(value)? {
-                        self.places_of_geometry(geometry, places)?;
+                        self.places_of_geometry(geometry, depth + 1, places)?;
                     }
                 }
                 _ => {}
@@ -208,29 +248,36 @@ impl<'a> Text<'a> {
         Some(())
     }
 
-    fn positions(&self, coordinates: Range<usize>, places: &mut Vec<Place>) -> Option<()> {
+    fn positions(&self, coordinates: Range<usize>, depth: usize, places: &mut Vec<Place>) -> Option<()> {
         if !self.is(&coordinates, b'[') {
             return Some(());
+        }
+        if depth > MOST_NESTED {
+            return None;
         }
         let elements = self.elements(coordinates.clone())?;
         match elements.first() {
             Some(first) if !self.is(first, b'[') => places.push(Place::Position(coordinates)),
-            _ => elements.into_iter().try_for_each(|element| self.positions(element, places))?,
+            _ => elements.into_iter().try_for_each(|element| self.positions(element, depth + 1, places))?,
         }
         Some(())
     }
 
     /// Returns whether a geometry has parts that GDAL's model does not hold.
-    fn has_more(&self, geometry: &Range<usize>) -> Option<bool> {
+    fn has_more(&self, geometry: &Range<usize>, depth: usize) -> Option<bool> {
         if !self.is(geometry, b'{') {
             return Some(false);
         }
-        for (key, value) in self.members(geometry.clone())? {
-            let has_more = match key {
+        if depth > MOST_NESTED {
+            return None;
+        }
+        for Member { key, value, .. } in self.members(geometry.clone())? {
+            let has_more = match &*key {
                 b"type" | b"bbox" => false,
                 b"coordinates" => self.has_fourth_ordinate(value)?,
                 b"geometries" if self.is(&value, b'[') => {
-                    let each = self.elements(value)?.into_iter().map(|geometry| self.has_more(&geometry));
+                    let each =
+                        self.elements(value)?.into_iter().map(|geometry| self.has_more(&geometry, depth + 1));
                     each.collect::<Option<Vec<bool>>>()?.contains(&true)
                 }
                 _ => true,
@@ -244,7 +291,7 @@ impl<'a> Text<'a> {
 
     fn has_fourth_ordinate(&self, coordinates: Range<usize>) -> Option<bool> {
         let mut places = Vec::new();
-        self.positions(coordinates, &mut places)?;
+        self.positions(coordinates, 0, &mut places)?;
         let has =
             |place: &Place| matches!(place, Place::Position(at) if numbers(&self.0[at.clone()]).count() > 3);
         Some(places.iter().any(has))
@@ -252,7 +299,7 @@ impl<'a> Text<'a> {
 
     fn without_places_of_geometry(&self, geometry: Range<usize>) -> Option<Vec<u8>> {
         let (mut places, mut text, mut at) = (Vec::new(), Vec::new(), geometry.start);
-        self.places_of_geometry(geometry.clone(), &mut places)?;
+        self.places_of_geometry(geometry.clone(), 0, &mut places)?;
         for place in places {
             let (Place::Position(range) | Place::BoundingBox(range)) = &place;
             text.extend(&self.0[at..range.start]);
@@ -341,9 +388,41 @@ mod tests {
             (r#"{"place":{"type":"Point","coordinates": [1, 2]}}"#, true),
             (r#"{"tile":{"a":{"bbox" :[1,2,3,4]}}}"#, true),
             (r#"{"geometry":{"coordinates":[1,2],"meta":{"coordinates":[1,2]}}}"#, true),
+            (r#"{"tile":{"shows":"bbox","bbox":[1,2,3,4]}}"#, true),
+            (r#"{"tile":["coordinates",{"coordinates":[1,2]}]}"#, true),
+            (r#"{"tile":{"b\u0062ox":[1,2,3,4]}}"#, true),
             ("null", false),
         ] {
             assert_eq!(has_foreign_places(text.as_bytes()), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn escapes_in_a_key_do_not_hide_it() {
+        let text = r#"{"id":7,"\u0062box":[1,2,1,2],"geom\u0065try":{"coordinate\u0073":[1,2,3,4]}}"#;
+        assert_eq!(places(text.as_bytes()).unwrap().len(), 2);
+        let expected = r#"{"id":7,"\u0062box":null,"geom\u0065try":{"coordinate\u0073":[0,0,0,4]}}"#;
+        assert_eq!(kept(text).as_deref(), Some(expected));
+    }
+
+    #[test]
+    fn what_is_no_object_is_refused_before_a_character_is_cut() {
+        for text in ["{é:1}", r#"{"a"é1}"#, r#"{"a" 1}"#, "{1:2}", "{'a':1}"] {
+            assert_eq!((kept(text), places(text.as_bytes())), (None, None), "{text}");
+        }
+    }
+
+    #[test]
+    fn geometries_without_an_end_are_refused() {
+        let nested = |before: &str, after: &str, depth: usize| {
+            format!(r#"{{"geometry":{}{}}}"#, before.repeat(depth), after.repeat(depth))
+        };
+        let collections = |depth| nested(r#"{"geometries":["#, "]}", depth);
+        let coordinates = |depth| nested("[", "]", depth).replace(":[", r#":{"coordinates":["#) + "}";
+        for text in [&collections as &dyn Fn(usize) -> String, &coordinates] {
+            assert_eq!(places(text(30).as_bytes()), Some(Vec::new()));
+            let deep = text(100_000);
+            assert_eq!((kept(&deep), places(deep.as_bytes())), (None, None));
         }
     }
 

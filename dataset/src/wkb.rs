@@ -221,14 +221,16 @@ impl Layout {
     }
 }
 
-/// Returns the flat type and the number of ordinates of an ISO or extended type code.
+/// Returns the flat type and the number of ordinates of an ISO or extended type code; 0 for a code
+/// of neither.
 fn decode_type(code: u32) -> (u32, usize) {
     let flags = usize::from(code & 0x8000_0000 != 0) + usize::from(code & 0x4000_0000 != 0);
     let iso = code & 0x0fff_ffff;
     let thousands = match iso / 1000 {
         0 => 0,
         1 | 2 => 1,
-        _ => 2,
+        3 => 2,
+        _ => return (0, 2),
     };
     (iso % 1000, 2 + thousands.max(flags))
 }
@@ -297,6 +299,12 @@ mod tests {
         let mut unknown = vec![1, 99, 0, 0, 0];
         let result = map_coordinates::<WkbError>(&mut unknown, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::UnknownType(99)));
+        // GDAL reads the last byte of such a code alone.
+        for code in [4001u32, 0xcf09, 0x0fff_ffff] {
+            let mut beyond = [&[1][..], &code.to_le_bytes(), &[0; 32]].concat();
+            let result = map_coordinates::<WkbError>(&mut beyond, &mut |_, p| Ok(p));
+            assert_eq!(result, Err(WkbError::UnknownType(code)));
+        }
         let mut nested: Vec<u8> = [1, 7, 0, 0, 0, 1, 0, 0, 0].repeat(1000);
         let result = map_coordinates::<WkbError>(&mut nested, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::TooDeep));

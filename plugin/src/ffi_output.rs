@@ -14,7 +14,7 @@ use gdal_sys::{
 };
 use std::{
     ffi::{CStr, CString, c_char, c_int},
-    mem::ManuallyDrop,
+    mem,
     path::Path,
     ptr,
 };
@@ -426,11 +426,10 @@ impl Output {
     }
 
     /// Closes the dataset; many drivers write only at this point.
-    pub fn close(self) -> Result<()> {
+    pub fn close(mut self) -> Result<()> {
         let collector = Collector::new();
-        let dataset = ManuallyDrop::new(self).dataset;
-        // SAFETY: the dataset is open and ours.
-        unsafe { gdal_sys::GDALClose(dataset) };
+        // SAFETY: the dataset is open and ours, and nothing else uses it afterwards.
+        unsafe { gdal_sys::GDALClose(mem::replace(&mut self.dataset, ptr::null_mut())) };
         match collector.first_failure() {
             None => Ok(()),
             Some(_) => Err(failure("closing".into(), &collector)),
@@ -438,9 +437,12 @@ impl Output {
     }
 }
 
-/// Abandons the dataset; messages of its driver about this are discarded.
+/// Abandons a dataset that was not closed; messages of its driver about this are discarded.
 impl Drop for Output {
     fn drop(&mut self) {
+        if self.dataset.is_null() {
+            return;
+        }
         let _quiet = Collector::new();
         // SAFETY: the dataset is open and ours.
         unsafe { gdal_sys::GDALClose(self.dataset) };

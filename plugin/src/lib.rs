@@ -20,6 +20,8 @@ mod error;
 mod ffi;
 mod ffi_errors;
 mod ffi_features;
+#[cfg(test)]
+mod ffi_memory;
 mod ffi_native_data;
 mod ffi_output;
 mod ffi_source;

@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use csv::{ReaderBuilder, StringRecord, Trim};
+use meshmark_core::visible;
 use std::{collections::BTreeSet, fs::File, io::Read, path::Path};
 
 const HEADER: &str = "recipient";
@@ -73,9 +74,10 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
         }
         match seen.insert(recipient.to_string()) {
             true => recipients.push(recipient.to_string()),
-            false => {
-                warn(&format!("{name}: \"{recipient}\" is there again in line {line}, and gets one copy"))
-            }
+            false => warn(&format!(
+                "{name}: \"{}\" is there again in line {line}, and gets one copy",
+                visible(recipient)
+            )),
         }
     }
     match recipients.is_empty() {
@@ -95,7 +97,7 @@ fn column(line: usize, first: &StringRecord) -> std::result::Result<Option<usize
         (None, _) if first.len() == 1 && reads_like_a_header(&first[0]) => Err(format!(
             "begins with \"{}\" in line {line}, which may be a header or a recipient: head the column \"{HEADER}\", in \
              place of that line or above it",
-            &first[0]
+            visible(&first[0])
         )),
         (None, _) => Ok(None),
     }
@@ -140,7 +142,7 @@ fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, S
     let mut line_at = |position: Option<&csv::Position>| {
         let start = position.map_or(0, |at| at.byte() as usize);
         let empty = text[start..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
-        line += text[counted..start + empty].iter().filter(|byte| **byte == b'\n').count();
+        line += (counted..start + empty).filter(|at| ends_line(text, *at)).count();
         counted = start + empty;
         line
     };
@@ -155,6 +157,14 @@ fn rows_between(text: &[u8], delimiter: u8) -> std::result::Result<Vec<(usize, S
         }
     }
     Ok(rows)
+}
+
+/// Returns whether a line ends with this byte: a line feed, a carriage return, or both in a row.
+fn ends_line(text: &[u8], at: usize) -> bool {
+    match text[at] {
+        b'\n' => at == 0 || text[at - 1] != b'\r',
+        byte => byte == b'\r',
+    }
 }
 
 #[cfg(test)]
@@ -202,6 +212,8 @@ mod tests {
         let (recipients, warning) = parse(b"A\n\nB\nA \na\n");
         assert_eq!(recipients, ["A", "B", "a"]);
         assert!(warning.contains("\"A\" is there again in line 4"), "{warning}");
+        let (_, warning) = parse("A\u{202e}B\nA\u{202e}B\n".as_bytes());
+        assert!(warning.contains("\"A\\u{202e}B\" is there again in line 2"), "{warning}");
     }
 
     #[test]
@@ -224,9 +236,13 @@ mod tests {
             ),
             (b"Companies\nA\n", "head the column \"recipient\", in place of that line or above it"),
             (b"recipient,Recipients\nA,B\n", "two columns headed \"recipient\" in line 1"),
+            (b"#\x0c#client\x0c#", "begins with \"#\\u{c}#client\\u{c}#\" in line 1"),
             (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
             (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
             (b"A\n\"B\nC\n", "control character in the recipient of line 2"),
+            (b"A\rB\r\rC,D\r", "2 columns in line 4"),
+            (b"A\r\nB\r\n\r\nC,D\r\n", "2 columns in line 4"),
+            (b"recipient\r\"a\rb\"", "control character in the recipient of line 2"),
             (b"A\0C\0", "control character in the recipient of line 1"),
         ] {
             let (_, found) = parse(text);
