@@ -60,8 +60,14 @@ run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json
     EVIDENCE_MAP="$maps/evidence.gpkg"
 logged "verify" "RECIPIENT:	Another Ltd"
 logged "verify" "VERDICT:	match"
-[ "$(ogrinfo -q "$maps/evidence.gpkg" | cut -d' ' -f2 | tr '\n' ' ')" = "vertex_displacements patches " ] ||
-    fail "the evidence map has not its two layers"
+has_layers() {
+    [ "$(ogrinfo -q "$1" | cut -d' ' -f2 | tr '\n' ' ')" = "$2 patches " ] || fail "$1 has not its two layers"
+}
+has_layers "$maps/evidence.gpkg" matched_vertices
+run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json" RECORDS="$maps/records" \
+    EVIDENCE_MAP="$maps/exact.gpkg" EXACT_DISPLACEMENTS=1
+logged "verify with exact displacements" "as secret as the records"
+has_layers "$maps/exact.gpkg" vertex_displacements
 run verify REFERENCE="$base.reference.gpkg" SUSPECT="$maps/map.gpkg" KEY="$PWD/key.json" RECORD="$base.json"
 logged "verify, an unmarked map" "VERDICT:	no-match"
 passed "verify names the recipient, and none for an unmarked map"

@@ -5,6 +5,7 @@ from qgis.core import (
     QgsFillSymbol,
     QgsGeometryGeneratorSymbolLayer,
     QgsLineSymbol,
+    QgsMarkerSymbol,
     QgsProcessingLayerPostProcessorInterface,
     QgsRuleBasedRenderer,
     QgsVectorLayerUtils,
@@ -22,13 +23,26 @@ def displacements(layer):
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
     exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
+    return by_weight(lambda colour: arrow(colour, exaggeration))
+
+
+def vertices(_layer):
+    """Returns a renderer of points; colours show the weight."""
+    return by_weight(point)
+
+
+def by_weight(symbol):
     return rules(
         [
-            (tr("agrees with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
-            (tr("agrees less"), '"weight" >= 0.5 AND "weight" < 0.9', arrow("#e69f00", exaggeration)),
-            (tr("does not agree"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
+            (tr("agrees with its neighbours"), '"weight" >= 0.9', symbol("#0072b2")),
+            (tr("agrees less"), '"weight" >= 0.5 AND "weight" < 0.9', symbol("#e69f00")),
+            (tr("does not agree"), '"weight" < 0.5', symbol("#d55e00")),
         ]
     )
+
+
+def point(colour):
+    return QgsMarkerSymbol.createSimple({"color": colour, "size": "1.4", "outline_style": "no"})
 
 
 def patches(_layer):
@@ -122,6 +136,6 @@ _STYLERS = {}
 
 def processor(name):
     """Returns a post-processor for the layer of this name."""
-    is_above = name == "vertex_displacements"
-    _STYLERS[name] = Styler(displacements if is_above else patches, is_above)
+    renderer_of = {"patches": patches, "matched_vertices": vertices, "vertex_displacements": displacements}[name]
+    _STYLERS[name] = Styler(renderer_of, is_above=name != "patches")
     return _STYLERS[name]

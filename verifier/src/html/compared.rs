@@ -137,7 +137,7 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                     tr {
                         td { @match &entry.recipient {
                             Some(recipient) => (clipped(recipient)),
-                            None => code { @if let Some(message) = &entry.message { (message) } },
+                            None => "–",
                         } }
                         td { (printable(&entry.record)) }
                         td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } }

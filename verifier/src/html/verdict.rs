@@ -81,6 +81,7 @@ fn mark(report: &Report) -> Markup {
             }
             (_, Some(recipient), _) => { "the copy made for “" span.name { (clipped(recipient)) } "”" }
             (_, None, Some(message)) => { "the copy with the message " code { (message) } }
+            _ if report.is_of_somebody() => { "the copy that the record is of" }
             _ => { "key " code { (p.key_id) } }
         }
     }

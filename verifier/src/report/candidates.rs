@@ -25,11 +25,9 @@ pub struct Entry {
     pub record: String,
     /// Recipient; null when the message was given as bits.
     pub recipient: Option<String>,
-    /// Message, hexadecimal; null where the mark is a fingerprint.
-    pub message: Option<String>,
     /// log₁₀ of the p-value times the number of candidates; null when nothing was decoded.
     pub p_value_log10: Option<f64>,
-    /// Number of decoded bits that differ from the message; null when nothing was decoded.
+    /// Number of decoded bits that differ from the message of a record that matches; null otherwise.
     pub bit_errors: Option<usize>,
 }
 
@@ -55,10 +53,10 @@ impl Candidates {
 
 impl Entry {
     pub(crate) fn name(&self) -> String {
-        let whose = match (&self.recipient, &self.message) {
-            (Some(recipient), _) => printable(recipient),
-            (None, message) => format!("message {}", message.as_deref().unwrap_or_default()),
-        };
-        format!("{whose} ({})", printable(&self.record))
+        let record = printable(&self.record);
+        match &self.recipient {
+            Some(recipient) => format!("{} ({record})", printable(recipient)),
+            None => record,
+        }
     }
 }

@@ -10,12 +10,19 @@ pub struct FoundVertex {
     pub at: [f64; 2],
     /// The number of its patch.
     pub patch: usize,
-    /// Its place in the suspect after registration, CRS units.
-    pub to: [f64; 2],
-    /// The displacement between the two, metres on the ground.
-    pub moved_m: [f64; 2],
+    /// Its displacement; `None` unless exact displacements are asked for.
+    pub displacement: Option<ExactDisplacement>,
     /// The weight: 1, or less where the displacement disagrees with the others.
     pub weight: f64,
+}
+
+/// The exact displacement of a matched vertex.
+#[derive(Debug, Clone, Copy)]
+pub struct ExactDisplacement {
+    /// Its place in the suspect after registration, CRS units.
+    pub to: [f64; 2],
+    /// The displacement from the reference, metres on the ground.
+    pub moved_m: [f64; 2],
 }
 
 /// The evidence of one patch.
@@ -37,6 +44,8 @@ pub struct EvidenceMap {
     pub crs: Option<CoordinateSystem>,
     /// Matched vertices in canonical order.
     pub vertices: Vec<FoundVertex>,
+    /// Whether the vertices have their exact displacements.
+    pub has_displacements: bool,
     /// All patches, with or without matched vertices.
     pub patches: Vec<PatchEvidence>,
 }

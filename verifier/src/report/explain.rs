@@ -1,6 +1,6 @@
 //! The output of `--explain`: the report in sentences, for readers who depend on it.
 
-use super::Report;
+use super::{MarkParameters, Report};
 use crate::{
     inputs::digests::Inputs,
     words::{clipped, power_of_ten},
@@ -222,6 +222,11 @@ pub(crate) fn bound(report: &Report) -> Vec<String> {
              the two, and without the key nobody can choose it.",
             clipped(recipient)
         ),
+        (Some(recipient), None) if matches!(p.mark, MarkParameters::Message(_)) => format!(
+            "The message was computed again from the key and the recipient \"{}\": it is a keyed hash of the two, and \
+             without the key nobody can choose it.",
+            clipped(recipient)
+        ),
         (Some(recipient), None) => format!(
             "The secret signs were computed again from the key and the recipient \"{}\": without the key nobody can \
              make them.",
@@ -231,6 +236,11 @@ pub(crate) fn bound(report: &Report) -> Vec<String> {
             "The message {message} was given as bare bits: nothing in it names a recipient, and who received it must be \
              shown by other means."
         ),
+        _ if report.is_of_somebody() => {
+            "The message of the record was given as bare bits: nothing in it names a recipient, and who received it must \
+             be shown by other means."
+                .into()
+        }
         _ => "No message was expected, so no recipient is named.".into(),
     };
     vec![sentence]

@@ -12,7 +12,7 @@ mod text;
 
 pub use candidates::{Candidates, Entry};
 pub use evidence::{Evidence, Provenance};
-pub use evidence_map::{EvidenceMap, FoundVertex, PatchEvidence};
+pub use evidence_map::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidence};
 pub use explain::explain;
 pub use extent::Extent;
 pub use fingerprint::{FingerprintEntry, PatchAgreement, SignAgreement};

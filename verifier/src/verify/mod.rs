@@ -10,6 +10,7 @@
 mod belonging;
 mod conclusion;
 mod crs_search;
+mod disclosed;
 mod drawing;
 mod evidence;
 mod examination;
