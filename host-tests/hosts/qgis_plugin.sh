@@ -161,4 +161,4 @@ QT_QPA_PLATFORM=xcb timeout 300 xvfb-run -a -s "-screen 0 1280x960x24" \
     qgis --nologo --noversioncheck --code "$hosts/in_qgis_desktop.py" >"$work/log" 2>&1 || fail "QGIS: $(cat "$work/log")"
 verify "the context menu's export" "$work/desktop/records/by_menu.reference.gpkg" "$work/desktop/by_menu.gpkg" \
     --record "$work/desktop/records/by_menu.json"
-passed "QGIS shows dialog, displacements and patches"
+passed "QGIS shows dialog, vertices and patches"
