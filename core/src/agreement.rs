@@ -6,7 +6,7 @@
 
 use crate::{
     estimation::Estimates,
-    signs::{Sequence, Signs, is_pilot, signed},
+    signs::{Sequence, Signs, decoy_sums, is_pilot, signed},
 };
 
 /// Rounds in which the shares of several recipients are fitted together. Their signs are nearly
@@ -71,6 +71,13 @@ impl Evidence {
     /// Returns the agreement with secret signs in each patch alone.
     pub fn patch_agreements(&self, signs: &Sequence) -> Vec<Agreement> {
         (0..self.patches()).map(|patch| self.agreement_on(signs, patch..patch + 1)).collect()
+    }
+
+    /// Returns the scores of `count` decoys on the same suspect: recipients or keys that nobody made,
+    /// with random signs. Decoy k takes them from ChaCha20 stream k.
+    pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
+        let deviation = self.energy().sqrt();
+        decoy_sums(&self.values, count, seed).into_iter().map(|sum| ratio(sum, deviation)).collect()
     }
 
     /// Returns the amplitude of secret signs that fits best, 1 for a mark of full amplitude.

@@ -89,7 +89,7 @@ def export_by_context_menu():
     parameters = dialog.createProcessingParameters()
     assert set(parameters["LAYERS"]) == {layer.source() for layer in layers}, parameters
     assert parameters["KEY"] == f"{WORK}/key.json", "the default is not that of the settings"
-    assert parameters["AMPLITUDE"] == 0.1 and parameters["SHAPE"] == "FREE", parameters
+    assert parameters["AMPLITUDE"] == 0.1, parameters
     for_picture = {
         "RECIPIENT": "ACME GmbH",
         "KEY": "/maps/key.json",

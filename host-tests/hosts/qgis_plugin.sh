@@ -27,7 +27,7 @@ for algorithm in export verify compare; do
 done
 passed "qgis_process lists the three algorithms"
 "$qgis_process" help meshmark:export >"$work/log" 2>&1
-grep -q 'Amplitude of every coefficient' "$work/log" || fail "the help of AMPLITUDE is not that of the driver"
+grep -q 'Displacement of the vertices by a fingerprint' "$work/log" || fail "the help of AMPLITUDE is not that of the driver"
 
 # run ALGORITHM NAME=VALUE...: leaves the exit code in $code.
 run() {

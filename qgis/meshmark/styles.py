@@ -1,7 +1,10 @@
 """The styles of the evidence layers: colours for colour-blind readers (Okabe and Ito 2008)."""
 
+import itertools
+
 from qgis.core import (
     QgsArrowSymbolLayer,
+    QgsExpression,
     QgsFillSymbol,
     QgsGeometryGeneratorSymbolLayer,
     QgsLineSymbol,
@@ -14,6 +17,8 @@ from qgis.PyQt.QtGui import QColor
 
 from .text import tr
 
+# Colours of recipients.
+COLOURS = ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"]
 # Length of an arrow of typical displacement on the screen, metres.
 ARROW_M = 0.003
 
@@ -45,9 +50,15 @@ def point(colour):
     return QgsMarkerSymbol.createSimple({"color": colour, "size": "1.4", "outline_style": "no"})
 
 
-def patches(_layer):
-    """Returns a renderer that colours patches by score, which is standard normal under a wrong key:
-    one patch of 30 000 exceeds 4."""
+def patches(layer):
+    """Returns a renderer that colours patches by recipient where the copies of several are mixed, and
+    otherwise by score, which is standard normal under a wrong key: one patch of 30 000 exceeds 4."""
+    values, _ = QgsVectorLayerUtils.getValues(layer, "recipient")
+    recipients = sorted({value for value in values if isinstance(value, str)})
+    if len(recipients) > 1:
+        colours = zip(recipients, itertools.cycle(COLOURS))
+        owned = [(name, f'"recipient" = {QgsExpression.quotedValue(name)}', area(c, 110)) for name, c in colours]
+        return rules([*owned, (tr("several recipients, or none"), '"recipient" IS NULL', area("#999999", 30))])
     return rules(
         [
             (tr("clear evidence (6 and more)"), '"score" >= 6', area("#0072b2", 110)),

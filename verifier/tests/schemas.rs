@@ -178,6 +178,7 @@ fn report_files_are_valid_whatever_the_verdict() {
         vec![record[0], record[1], "helsinki.gpkg"],
         vec![record[0], record[1], "--exact-displacements", "vectors/marked.gpkg"],
         vec!["--records", "vectors", "vectors/marked.gpkg"],
+        vec!["--records", "vectors/fingerprint", "vectors/fingerprint/marked.gpkg"],
         vec!["--layers", "buildings,landuse,roads", "--precision", "0.001", "vectors/marked.gpkg"],
     ] {
         let report = report_file(&[&verify[..], &arguments].concat());
@@ -371,7 +372,9 @@ fn reports_on_fingerprints_are_valid_for_every_verdict_and_hold_no_bits() {
         assert_eq!(report["fingerprint"].is_null(), verdict == "inconclusive");
     }
     let report = report("map with a fingerprint", &record);
-    assert_closed("report", &report, &["/fingerprint", "/fingerprint/recipient", "/fingerprint/patches"]);
+    let objects = ["", "/recipient", "/patches", "/recipient_decoys", "/key_decoys"];
+    let objects = objects.map(|object| format!("/fingerprint{object}"));
+    assert_closed("report", &report, &objects.each_ref().map(String::as_str));
     let changes = [
         ("/fingerprint/recipient/signs", json!(-1)),
         ("/fingerprint/key/p_log10", json!(0.5)),

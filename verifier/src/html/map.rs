@@ -1,16 +1,14 @@
 //! The evidence on the map: patches with their scores, vertices with their displacements.
 
 use super::{
-    frame::{Frame, largest_below, metres},
+    frame::{Frame, MOST_LABELLED, largest_below, metres},
+    members::members,
     page::{count, figure, section},
 };
-use crate::report::{Evidence, Report, sketch::PatchPlace};
+use crate::report::{Evidence, Report};
 use maud::{Markup, html};
 use meshmark_detection::decision::Verdict;
 use std::fmt::Write as _;
-
-/// With more patches the numbers of their scores are illegible.
-const MOST_NUMBERED: usize = 60;
 
 /// Classes of patches: the score from which a class begins, standard deviations, its name and its
 /// meaning.
@@ -28,6 +26,7 @@ pub fn evidence(report: &Report) -> Markup {
     let content = html! {
         (patterns())
         (patches(report, evidence, &frame))
+        (members(evidence, &frame))
         (vertices(report, evidence, &frame))
     };
     section("Where on the map the evidence is", &content)
@@ -69,9 +68,9 @@ fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
                     d=(frame.path(std::iter::once(&place.outline), true)) {}
             }
             (frame.lines(&evidence.sketch.lines))
-            @if scored && places.len() <= MOST_NUMBERED {
+            @if scored && places.len() <= MOST_LABELLED {
                 @for (number, place) in places.iter().enumerate() {
-                    @let [x, y] = frame.at(middle(place));
+                    @let [x, y] = frame.middle(&place.outline);
                     @if let Some(score) = score(number) { text x=(x) y=(y + 35) { (format!("{score:.1}").replace('-', "−")) } }
                 }
             }
@@ -94,7 +93,7 @@ fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
             (legend(evidence))
         } @else {
             "The reference and its " (count(places.len())) " patches. No patch has a score: nothing was demodulated, or no \
-             message was expected."
+             message and no recipient was in question."
         }
     };
     figure(&drawing, &caption)
@@ -111,17 +110,6 @@ fn legend(evidence: &Evidence) -> Markup {
             @if used("unseen") { (entry("unseen", "nothing found")) }
         }
     }
-}
-
-fn middle(place: &PatchPlace) -> [f64; 2] {
-    let ends = |axis: usize| {
-        let values = place.outline.iter().map(|p| p[axis]);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
-    };
-    [0, 1].map(|axis| {
-        let (low, high) = ends(axis);
-        low + (high - low) / 2.0
-    })
 }
 
 fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {

@@ -130,8 +130,14 @@ fn write_displacements(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors
 }
 
 fn write_patches(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
-    use OGRFieldType::{OFTInteger, OFTReal};
-    let fields = [("patch", OFTInteger), ("vertices", OFTInteger), ("found", OFTInteger), ("score", OFTReal)];
+    use OGRFieldType::{OFTInteger, OFTReal, OFTString};
+    let fields = [
+        ("patch", OFTInteger),
+        ("vertices", OFTInteger),
+        ("found", OFTInteger),
+        ("score", OFTReal),
+        ("recipient", OFTString),
+    ];
     let (kind, rows) = (OGRwkbGeometryType::wkbPolygon, map.patches.iter().enumerate());
     write_layer(dataset, map.crs.as_ref(), ("patches", kind), &fields, rows, |(number, patch), feature| {
         for (field, value) in [number, patch.vertices.len(), patch.found].into_iter().enumerate() {
@@ -139,6 +145,9 @@ fn write_patches(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Resu
         }
         if let Some(score) = patch.score {
             feature.set_field_double(3, score)?;
+        }
+        if let Some(recipient) = &patch.recipient {
+            feature.set_field_string(4, recipient)?;
         }
         points(&patch.vertices)?.convex_hull()
     })

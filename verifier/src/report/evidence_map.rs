@@ -35,6 +35,8 @@ pub struct PatchEvidence {
     /// The score in standard deviations of a random key; `None` where no vertex matches or no
     /// message is expected.
     pub score: Option<f64>,
+    /// The recipient from whose copy the patch comes; `None` where it is not clear.
+    pub recipient: Option<String>,
 }
 
 /// The places of matched vertices, and the evidence of each patch.
@@ -51,10 +53,11 @@ pub struct EvidenceMap {
 }
 
 impl EvidenceMap {
-    /// Adds the score of every patch for the expected message; without scores the map stays
-    /// unchanged.
-    pub fn scored(mut self, scores: Vec<Option<f64>>) -> Self {
+    /// Adds the score of every patch for the expected mark, and the recipient from whose copy it
+    /// comes; without these the map stays unchanged.
+    pub fn scored(mut self, scores: Vec<Option<f64>>, recipients: Vec<Option<String>>) -> Self {
         self.patches.iter_mut().zip(scores).for_each(|(patch, score)| patch.score = score);
+        self.patches.iter_mut().zip(recipients).for_each(|(patch, recipient)| patch.recipient = recipient);
         self
     }
 }

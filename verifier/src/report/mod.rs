@@ -11,7 +11,7 @@ pub mod sketch;
 mod text;
 
 pub use candidates::{Candidates, Entry};
-pub use evidence::{Evidence, Provenance};
+pub use evidence::{Evidence, Member, Provenance};
 pub use evidence_map::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidence};
 pub use explain::explain;
 pub use extent::Extent;

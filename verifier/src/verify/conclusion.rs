@@ -4,10 +4,11 @@ use super::{
     disclosed,
     evidence::{FingerprintEvidence, Found, MessageEvidence},
     examination::Examination,
+    members::Members,
     request::{Request, Sought},
 };
 use crate::report::{
-    Certainty, CodeEntry, Evidence, FingerprintEntry, MarkParameters, PatchAgreement, Report,
+    Certainty, CodeEntry, Evidence, FingerprintEntry, MarkParameters, Member, PatchAgreement, Report,
     ReportParameters, SignAgreement,
 };
 use meshmark_core::{carrier::Carrier, fingerprint_record::FingerprintShape, message::Message};
@@ -65,7 +66,13 @@ pub fn conclude(
         certainty: decoded.as_ref().and_then(|decoded| certainty(&decoded.message_llrs)),
         bits: decoded.iter().flat_map(|d| &d.message_llrs).map(|llr| disclosed::score(*llr)).collect(),
         code: Some(code),
-        ..report(request, seen, (decision.verdict, decision.reason), seconds, &patch_scores)
+        ..report(
+            request,
+            seen,
+            (decision.verdict, decision.reason),
+            seconds,
+            (&patch_scores, Members::default()),
+        )
     }
 }
 
@@ -82,16 +89,25 @@ pub fn conclude_fingerprint(
         Ok(Found::Message(_)) => unreachable!("a fingerprint is sought"),
         Err(reason) => {
             let answer = (Verdict::Inconclusive, reason.clone());
-            return report(request, seen, answer, seconds, &|_| Vec::new());
+            return report(request, seen, answer, seconds, (&|_| Vec::new(), Members::default()));
         }
     };
     let FingerprintEvidence { recipients, pilots, .. } = found;
+    let scored = |decoys: &Option<Decoys>, tested: Option<f64>| {
+        decoys.clone().map(|decoys| Decoys { tested: tested.map(disclosed::score), ..decoys })
+    };
+    let of_key = FingerprintEntry {
+        recipient: None,
+        key: (*pilots).into(),
+        patches: None,
+        recipient_decoys: scored(&found.recipient_decoys, None),
+        key_decoys: scored(&found.key_decoys, Some(pilots.score)),
+    };
     let Some((standing, answer)) = recipients.get(number) else {
-        let fingerprint = FingerprintEntry { recipient: None, key: (*pilots).into(), patches: None };
-        let answer = (Verdict::Inconclusive, without_recipient(fingerprint.shows_key()));
+        let answer = (Verdict::Inconclusive, without_recipient(of_key.shows_key()));
         return Report {
-            fingerprint: Some(fingerprint),
-            ..report(request, seen, answer, seconds, &|_| Vec::new())
+            fingerprint: Some(of_key),
+            ..report(request, seen, answer, seconds, (&|_| Vec::new(), Members::default()))
         };
     };
     let recipient = request.recipient().expect("a fingerprint is that of a recipient");
@@ -109,15 +125,23 @@ pub fn conclude_fingerprint(
     };
     let fingerprint = FingerprintEntry {
         recipient: Some(of_recipient),
-        key: (*pilots).into(),
         patches: Some(PatchAgreement::of(&scores)),
+        recipient_decoys: scored(&found.recipient_decoys, Some(standing.agreement.score)),
+        ..of_key
     };
+    let members = Members::new(request, found);
     Report {
         p_value_log10: p(standing.p_value_log10),
         p_recipient_log10: p(p_log10(standing.score).min(0.0)),
         p_missed_log10: answer.p_missed_log10,
         fingerprint: Some(fingerprint),
-        ..report(request, seen, (answer.verdict, answer.reason.clone()), seconds, &|_| scores.clone())
+        ..report(
+            request,
+            seen,
+            (answer.verdict, answer.reason.clone()),
+            seconds,
+            (&|_| scores.clone(), members),
+        )
     }
 }
 
@@ -136,12 +160,16 @@ fn report(
     seen: &Examination,
     (verdict, reason): (Verdict, String),
     seconds: &BTreeMap<&'static str, f64>,
-    patch_scores: &dyn Fn(usize) -> Vec<Option<f64>>,
+    (patch_scores, members): (&dyn Fn(usize) -> Vec<Option<f64>>, Members),
 ) -> Report {
     let (sketch, evidence_map) = (seen.sketch.clone(), seen.evidence_map.clone());
-    let patch_scores = |patches: usize| -> Vec<Option<f64>> {
-        patch_scores(patches).into_iter().map(|score| score.map(disclosed::score)).collect()
-    };
+    let disclosed =
+        |scores: Vec<Option<f64>>| scores.into_iter().map(|score| score.map(disclosed::score)).collect();
+    let patch_scores = |patches: usize| -> Vec<Option<f64>> { disclosed(patch_scores(patches)) };
+    let recipients = members.recipients();
+    let Members { members, of_patch } = members;
+    let of_member = |member: Member| Member { patch_scores: disclosed(member.patch_scores), ..member };
+    let members = members.into_iter().map(of_member).collect();
     Report {
         meshmark_report: 1,
         verdict,
@@ -167,7 +195,12 @@ fn report(
         parameters: report_parameters(request, seen, verdict),
         seconds: Some(seconds.clone()),
         provenance: None,
-        evidence: sketch.map(|sketch| Evidence { patch_scores: patch_scores(sketch.patches.len()), sketch }),
+        evidence: sketch.map(|sketch| Evidence {
+            patch_scores: patch_scores(sketch.patches.len()),
+            members,
+            patch_members: of_patch,
+            sketch,
+        }),
         tried: 1,
         certainty: None,
         expected_carried: None,
@@ -176,7 +209,7 @@ fn report(
         suspect_crs: seen.suspect_crs.clone(),
         evidence_map: evidence_map.map(|map| {
             let scores = patch_scores(map.patches.len());
-            map.scored(scores)
+            map.scored(scores, recipients)
         }),
     }
 }

@@ -14,6 +14,7 @@ mod disclosed;
 mod drawing;
 mod evidence;
 mod examination;
+mod members;
 mod records;
 mod references;
 mod request;

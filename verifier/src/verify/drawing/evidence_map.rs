@@ -19,6 +19,7 @@ pub fn evidence_map(scene: &Scene, crs: Option<&CoordinateSystem>) -> EvidenceMa
         vertices: patch.vertices.iter().map(|&v| coords[v as usize]).collect(),
         found: 0,
         score: None,
+        recipient: None,
     };
     let patches = patches.iter().map(of_patch).collect();
     let has_displacements = scene.exact_displacements;
