@@ -329,6 +329,25 @@ fn no_output_holds_what_forges_the_copy_of_another_recipient() {
 }
 
 #[test]
+fn report_files_do_not_name_those_whose_records_do_not_match() {
+    let folder = tempfile::tempdir().unwrap();
+    let records = COPIES.folder.path().join("copies");
+    let suspect = COPIES.file(GUILTY, ".gpkg");
+    for name in ["report.json", "report.html"] {
+        let report = folder.path().join(name);
+        let more = ["--records", records.to_str().unwrap(), "--report", report.to_str().unwrap()];
+        assert!(verify(&suspect, &more).status.success());
+        let text = fs::read_to_string(&report).unwrap();
+        assert!(text.contains(GUILTY) && !text.contains(INNOCENT), "{name}");
+    }
+    let report: Value =
+        serde_json::from_slice(&fs::read(folder.path().join("report.json")).unwrap()).unwrap();
+    let candidates = &report["candidates"];
+    assert_eq!((&candidates["tried"], candidates["list"].as_array().unwrap().len()), (&3.into(), 1));
+    assert!(candidates["next_p_value_log10"].as_f64().unwrap() > -3.0);
+}
+
+#[test]
 fn displacements_and_messages_together_would_forge_it() {
     let innocent = BTreeSet::from([COPIES.message(INNOCENT).to_hex()]);
     assert!(frames_the_innocent(&own_copy(), &innocent));

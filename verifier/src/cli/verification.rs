@@ -133,7 +133,7 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
             command: command_line::own(),
             versions: versions(),
         };
-        let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report };
+        let report = Report { provenance: Some(provenance), evidence, ..report.into_file() };
         match format {
             Format::Html => html::verification(&report),
             Format::Json => report.to_json(),

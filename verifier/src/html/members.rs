@@ -43,8 +43,10 @@ pub fn members(evidence: &Evidence, frame: &Frame) -> Markup {
             @for (number, member) in members.iter().enumerate() {
                 li {
                     svg.swatch viewBox="0 0 120 80" aria-hidden="true" { rect class=(class(number)) width="120" height="80" {} }
-                    b { (letter(number)) } " " span.name { (clipped(&member.recipient)) } ": "
-                    (count(of(number))) " of " (count(places.len())) " patches"
+                    span.name {
+                        b { (letter(number)) } ", " (clipped(&member.recipient)) ": "
+                        (count(of(number))) " of " (count(places.len())) " patches"
+                    }
                 }
             }
         }

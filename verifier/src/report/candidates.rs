@@ -13,6 +13,8 @@ pub struct Candidates {
     pub skipped: usize,
     /// The best records, the most significant first.
     pub list: Vec<Entry>,
+    /// log₁₀ of the p-value of the best record that is not listed; null when there is none.
+    pub next_p_value_log10: Option<f64>,
     /// Number of records that match.
     #[serde(skip)]
     pub(crate) matches: usize,
@@ -32,6 +34,14 @@ pub struct Entry {
 }
 
 impl Candidates {
+    /// Returns what a report file holds, which others read: no name of a recipient whose record does
+    /// not match, but for the nearest one where none does.
+    pub(crate) fn into_file(mut self) -> Self {
+        let others = self.list.split_off(self.matches.max(1).min(self.list.len()));
+        self.next_p_value_log10 = others.first().map_or(self.next_p_value_log10, |next| next.p_value_log10);
+        self
+    }
+
     /// Returns lines of text.
     pub(crate) fn to_lines(&self) -> Vec<String> {
         let skipped = match self.skipped {

@@ -202,6 +202,13 @@ impl Report {
         serde_json::to_string_pretty(self).expect("numbers and strings are JSON") + "\n"
     }
 
+    /// Returns the report as a file holds it, which is the same for the same input and which others
+    /// read.
+    pub fn into_file(self) -> Self {
+        let candidates = self.candidates.map(Candidates::into_file);
+        Report { seconds: None, candidates, ..self }
+    }
+
     /// Returns the exit code of this verdict.
     pub fn exit_code(&self) -> ExitCode {
         match self.verdict {

@@ -375,8 +375,7 @@ fn overall(outcomes: &[Outcome]) -> Overall {
         (1, _) => best,
         _ => Overall {
             reason: format!(
-                "for {matches} of the records the probability that key and message fit so well by chance is below the \
-                 significance"
+                "for {matches} of the records the probability of so good a fit by chance is below the significance"
             ),
             ..best
         },
@@ -398,6 +397,8 @@ fn listed(outcomes: &[Outcome], skipped: usize) -> Candidates {
             bit_errors: outcome.bit_errors.filter(|_| is_match),
         }
     };
-    let list = outcomes.iter().take(MOST_LISTED.max(matches)).map(entry).collect();
-    Candidates { tried: outcomes.len(), skipped, list, matches }
+    let mut entries = outcomes.iter().map(entry);
+    let list = entries.by_ref().take(MOST_LISTED.max(matches)).collect();
+    let next_p_value_log10 = entries.next().and_then(|next| next.p_value_log10);
+    Candidates { tried: outcomes.len(), skipped, list, next_p_value_log10, matches }
 }
