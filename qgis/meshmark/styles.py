@@ -7,6 +7,7 @@ from qgis.core import (
     QgsExpression,
     QgsFillSymbol,
     QgsGeometryGeneratorSymbolLayer,
+    QgsLayerTreeLayer,
     QgsLineSymbol,
     QgsMarkerSymbol,
     QgsProcessingLayerPostProcessorInterface,
@@ -31,7 +32,7 @@ def displacements(layer):
     return by_weight(lambda colour: arrow(colour, exaggeration))
 
 
-def vertices(_layer):
+def matched_vertices(_layer):
     """Returns a renderer of points; colours show the weight."""
     return by_weight(point)
 
@@ -112,32 +113,32 @@ def file_of(layer):
     return layer.source().partition("|")[0]
 
 
-def show_above(layer):
-    """Moves a layer above those of the same file, as QGIS places it by version and selection."""
+def show_vertices_above(layer):
+    """Moves vertices above the patches of the same file: QGIS places and loads layers in an order of its own."""
     node = layer.project().layerTreeRoot().findLayer(layer.id()) if layer.project() else None
     if node is None:
         return
     group = node.parent()
-    of_file = [other for other in group.findLayers() if other.layer() and file_of(other.layer()) == file_of(layer)]
-    first = min(group.children().index(other) for other in of_file if other.parent() == group)
-    if group.children().index(node) > first:
-        group.insertChildNode(first, node.clone())
-        group.removeChildNode(node)
+    nodes = [other for other in group.children() if isinstance(other, QgsLayerTreeLayer) and other.layer()]
+    nodes = [other for other in nodes if file_of(other.layer()) == file_of(layer)]
+    first = min(group.children().index(other) for other in nodes)
+    for vertices in [other for other in nodes if not other.layer().source().endswith("|layername=patches")]:
+        if group.children().index(vertices) > first:
+            group.insertChildNode(first, vertices.clone())
+            group.removeChildNode(vertices)
 
 
 class Styler(QgsProcessingLayerPostProcessorInterface):
     """Sets style and place of a layer when it is added to the project."""
 
-    def __init__(self, renderer_of, is_above):
+    def __init__(self, renderer_of):
         super().__init__()
         self._renderer_of = renderer_of
-        self._is_above = is_above
 
     def postProcessLayer(self, layer, context, feedback):
         layer.setRenderer(self._renderer_of(layer))
         layer.triggerRepaint()
-        if self._is_above:
-            show_above(layer)
+        show_vertices_above(layer)
 
 
 # These references keep post-processors alive until their layer is loaded; QGIS deletes them then,
@@ -147,6 +148,6 @@ _STYLERS = {}
 
 def processor(name):
     """Returns a post-processor for the layer of this name."""
-    renderer_of = {"patches": patches, "matched_vertices": vertices, "vertex_displacements": displacements}[name]
-    _STYLERS[name] = Styler(renderer_of, is_above=name != "patches")
+    renderer_of = {"patches": patches, "matched_vertices": matched_vertices, "vertex_displacements": displacements}[name]
+    _STYLERS[name] = Styler(renderer_of)
     return _STYLERS[name]

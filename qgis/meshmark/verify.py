@@ -87,7 +87,7 @@ class Verify(Algorithm):
             ),
         )
         self.add(
-            QgsProcessingParameterBoolean(EXACT, tr("Exact displacements (confidential)"), False),
+            QgsProcessingParameterBoolean(EXACT, tr("Exact displacements"), False),
             tr(
                 "Draws an arrow for the displacement of every matched vertex. With these displacements and the unmarked"
                 " map anyone can make the mark of this copy again: keep evidence map and report as secret as the"
