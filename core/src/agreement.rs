@@ -236,6 +236,17 @@ mod tests {
     }
 
     #[test]
+    fn scores_of_decoys_are_standard_normal_and_the_same_again() {
+        let evidence = Evidence::of_recipients(&mean_of(&[1]));
+        let scores = evidence.decoy_scores(10_000, [5; 32]);
+        assert_eq!(scores[..100], evidence.decoy_scores(100, [5; 32]));
+        let mean = scores.iter().sum::<f64>() / 1e4;
+        let variance = scores.iter().map(|s| s * s).sum::<f64>() / 1e4;
+        assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.07, "{mean} {variance}");
+        assert_ne!(scores[..100], Evidence::of_pilots(&mean_of(&[1])).decoy_scores(100, [5; 32]));
+    }
+
+    #[test]
     fn pilots_and_signs_of_recipients_are_different_coefficients_and_together_all() {
         let estimates = mean_of(&[1]);
         let [own, pilots] = [Evidence::of_recipients(&estimates), Evidence::of_pilots(&estimates)];

@@ -329,6 +329,16 @@ fn no_output_holds_what_forges_the_copy_of_another_recipient() {
 }
 
 #[test]
+fn places_of_vertices_outside_a_small_radius_are_no_displacements() {
+    let record = COPIES.file(INNOCENT, ".json").display().to_string();
+    let loot = Loot::of_verifications(&[&["--record", &record, "--radius", "0.02"]]);
+    let known = BTreeSet::from([COPIES.message(INNOCENT).to_hex()]);
+    for (source, displaced) in loot.displaced {
+        assert!(!frames_the_innocent(&displaced, &known), "{source}: {}", displaced.len());
+    }
+}
+
+#[test]
 fn report_files_do_not_name_those_whose_records_do_not_match() {
     let folder = tempfile::tempdir().unwrap();
     let records = COPIES.folder.path().join("copies");
