@@ -6,7 +6,7 @@
 
 use crate::{
     estimation::Estimates,
-    signs::{Sequence, Signs, is_pilot, signed},
+    signs::{Sequence, Signs, decoy_sums, is_pilot, signed},
 };
 
 /// Rounds in which the shares of several recipients are fitted together. Their signs are nearly
@@ -71,6 +71,13 @@ impl Evidence {
     /// Returns the agreement with secret signs in each patch alone.
     pub fn patch_agreements(&self, signs: &Sequence) -> Vec<Agreement> {
         (0..self.patches()).map(|patch| self.agreement_on(signs, patch..patch + 1)).collect()
+    }
+
+    /// Returns the scores of `count` decoys on the same suspect: recipients or keys that nobody made,
+    /// with random signs. Decoy k takes them from ChaCha20 stream k.
+    pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
+        let deviation = self.energy().sqrt();
+        decoy_sums(&self.values, count, seed).into_iter().map(|sum| ratio(sum, deviation)).collect()
     }
 
     /// Returns the amplitude of secret signs that fits best, 1 for a mark of full amplitude.
@@ -226,6 +233,17 @@ mod tests {
         assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.07, "{mean} {variance}");
         let beyond = scores.iter().filter(|s| **s > 1.644_854).count();
         assert!((390..610).contains(&beyond), "{beyond} instead of 500");
+    }
+
+    #[test]
+    fn scores_of_decoys_are_standard_normal_and_the_same_again() {
+        let evidence = Evidence::of_recipients(&mean_of(&[1]));
+        let scores = evidence.decoy_scores(10_000, [5; 32]);
+        assert_eq!(scores[..100], evidence.decoy_scores(100, [5; 32]));
+        let mean = scores.iter().sum::<f64>() / 1e4;
+        let variance = scores.iter().map(|s| s * s).sum::<f64>() / 1e4;
+        assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.07, "{mean} {variance}");
+        assert_ne!(scores[..100], Evidence::of_pilots(&mean_of(&[1])).decoy_scores(100, [5; 32]));
     }
 
     #[test]

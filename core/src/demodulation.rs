@@ -17,13 +17,10 @@ use crate::{
     options::Parameters,
     patches::{Patch, Patches},
     response::{Kernel, Response},
+    signs::decoy_sums,
     spectrum::Basis,
 };
 use faer::{Mat, linalg::solvers::Solve};
-use rand_chacha::{
-    ChaCha20Rng,
-    rand_core::{Rng, SeedableRng},
-};
 use rayon::prelude::*;
 
 /// Correlations with chips spread by this at least, metres.
@@ -119,17 +116,8 @@ impl Demodulation {
     /// replace the chips; decoy k takes them from ChaCha20 stream k.
     pub fn decoy_scores(&self, count: usize, seed: [u8; 32]) -> Vec<f64> {
         let deviation = self.null_deviation();
-        let score = |decoy: usize| {
-            let mut stream = ChaCha20Rng::from_seed(seed);
-            stream.set_stream(decoy as u64);
-            let sum_word = |values: &[f64]| {
-                let word = stream.next_u64();
-                let signed = |(i, a): (usize, &f64)| f64::from_bits(a.to_bits() ^ (word >> i << 63));
-                values.iter().enumerate().map(signed).sum::<f64>()
-            };
-            ratio(self.chip_correlations.chunks(64).map(sum_word).sum(), deviation)
-        };
-        (0..count).into_par_iter().map(score).collect()
+        let sums = decoy_sums(&self.chip_correlations, count, seed);
+        sums.into_iter().map(|sum| ratio(sum, deviation)).collect()
     }
 
     /// Returns Σ_j q_j² / n_j, where n_j = Σ a_i² over the chips of channel bit j, and the number
@@ -450,6 +438,10 @@ impl<'a> Job<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_chacha::{
+        ChaCha20Rng,
+        rand_core::{Rng, SeedableRng},
+    };
 
     /// 3 bits of 2 chips, 50 patches; a third of the correlations is 0.
     fn found() -> Demodulation {

@@ -503,7 +503,11 @@ mod tests {
         for corners in cases {
             let data = rings(corners);
             for shape in [Rigidity::Rigid, Rigidity::Stiff] {
-                let cut = Patches::new(&data.on(METRES, None), &Parameters { shape, ..size(16) }).unwrap();
+                let cut = Patches::new(
+                    &data.on(&Ground::METRES, &Ground::METRES),
+                    &Parameters { shape, ..size(16) },
+                )
+                .unwrap();
                 cut.validate().unwrap();
                 assert!(cut.smallest() > 0);
                 let bodies = &cut.constraints().bodies;

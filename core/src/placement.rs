@@ -126,7 +126,7 @@ mod tests {
     fn every_vertex_moves_to_the_tolerance_or_stays_where_its_last_digit_is_worth_more() {
         let coords = (0..10_000).map(|i| [385_000.0 + f64::from(i), 6_671_000.0]).collect();
         let table = VertexTable::new(coords).unwrap();
-        let map = Map::of_points(&table, Ground::Plane { metres_per_unit: 1.0 });
+        let map = Map::of_points(&table, &Ground::METRES);
         for (tolerance_m, moved) in [(1e-12, 0), (1e-7, 10_000), (1e-3, 10_000), (10.0, 10_000)] {
             let parameters = Parameters { tolerance_m, ..Parameters::default() };
             let placement = Placement::new(&map, &parameters).unwrap();

@@ -4,6 +4,7 @@ use rand_chacha::{
     ChaCha20Rng,
     rand_core::{Rng, SeedableRng},
 };
+use rayon::prelude::*;
 
 /// Coefficients of a patch and axis that carry a fingerprint by default.
 pub const COEFFICIENTS: usize = 256;
@@ -59,6 +60,24 @@ impl Signs for Sequence {
 /// Returns the value with the sign of bit `i` of a word of a [`Sequence`].
 pub(crate) fn signed(value: f64, word: u64, i: usize) -> f64 {
     f64::from_bits(value.to_bits() ^ (!word >> i) << 63)
+}
+
+/// Returns Σ ±a_i for `count` decoys, whose random signs decoy k takes from ChaCha20 stream k.
+pub(crate) fn decoy_sums(values: &[f64], count: usize, seed: [u8; 32]) -> Vec<f64> {
+    let sum = |decoy: usize| {
+        let mut stream = ChaCha20Rng::from_seed(seed);
+        stream.set_stream(decoy as u64);
+        let sum_word = |values: &[f64]| {
+            let word = stream.next_u64();
+            values
+                .iter()
+                .enumerate()
+                .map(|(i, a)| f64::from_bits(a.to_bits() ^ (word >> i << 63)))
+                .sum::<f64>()
+        };
+        values.chunks(64).map(sum_word).sum()
+    };
+    (0..count).into_par_iter().map(sum).collect()
 }
 
 #[cfg(test)]

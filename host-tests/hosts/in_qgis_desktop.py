@@ -89,7 +89,7 @@ def export_by_context_menu():
     parameters = dialog.createProcessingParameters()
     assert set(parameters["LAYERS"]) == {layer.source() for layer in layers}, parameters
     assert parameters["KEY"] == f"{WORK}/key.json", "the default is not that of the settings"
-    assert parameters["AMPLITUDE"] == 0.1 and parameters["SHAPE"] == "FREE", parameters
+    assert parameters["AMPLITUDE"] == 0.1, parameters
     for_picture = {
         "RECIPIENT": "ACME GmbH",
         "KEY": "/maps/key.json",
@@ -136,12 +136,12 @@ def verify():
     )
     assert results["VERDICT"] == "match" and results["RECIPIENT"] == "ACME GmbH", results
     layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
-    vertices, patches = layers["Displacements"], layers["Patches"]
+    vertices, patches = layers["Matched vertices"], layers["Patches"]
     assert vertices.featureCount() == results["MATCHED_VERTICES"] > 100
     for layer in (vertices, patches):
         assert layer.renderer().type() == "RuleRenderer", layer.renderer().type()
     order = [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()]
-    assert order.index("Displacements") < order.index("Patches"), f"patches hide the vertices: {order}"
+    assert order.index("Matched vertices") < order.index("Patches"), f"patches hide the vertices: {order}"
     iface.layerTreeView().expandAllNodes()
     iface.mapCanvas().setExtent(patches.extent().buffered(20))
     picture(iface.mainWindow(), "qgis-evidence.png")

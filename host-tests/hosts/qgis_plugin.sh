@@ -27,7 +27,7 @@ for algorithm in export verify compare; do
 done
 passed "qgis_process lists the three algorithms"
 "$qgis_process" help meshmark:export >"$work/log" 2>&1
-grep -q 'Amplitude of every coefficient' "$work/log" || fail "the help of AMPLITUDE is not that of the driver"
+grep -q 'Displacement of the vertices by a fingerprint' "$work/log" || fail "the help of AMPLITUDE is not that of the driver"
 
 # run ALGORITHM NAME=VALUE...: leaves the exit code in $code.
 run() {
@@ -60,8 +60,14 @@ run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json
     EVIDENCE_MAP="$maps/evidence.gpkg"
 logged "verify" "RECIPIENT:	Another Ltd"
 logged "verify" "VERDICT:	match"
-[ "$(ogrinfo -q "$maps/evidence.gpkg" | cut -d' ' -f2 | tr '\n' ' ')" = "vertex_displacements patches " ] ||
-    fail "the evidence map has not its two layers"
+has_layers() {
+    [ "$(ogrinfo -q "$1" | cut -d' ' -f2 | tr '\n' ' ')" = "$2 patches " ] || fail "$1 has not its two layers"
+}
+has_layers "$maps/evidence.gpkg" matched_vertices
+run verify REFERENCE="$base.reference.gpkg" SUSPECT="$marked" KEY="$PWD/key.json" RECORDS="$maps/records" \
+    EVIDENCE_MAP="$maps/exact.gpkg" EXACT_DISPLACEMENTS=1
+logged "verify with exact displacements" "as secret as the records"
+has_layers "$maps/exact.gpkg" vertex_displacements
 run verify REFERENCE="$base.reference.gpkg" SUSPECT="$maps/map.gpkg" KEY="$PWD/key.json" RECORD="$base.json"
 logged "verify, an unmarked map" "VERDICT:	no-match"
 passed "verify names the recipient, and none for an unmarked map"
@@ -155,4 +161,4 @@ QT_QPA_PLATFORM=xcb timeout 300 xvfb-run -a -s "-screen 0 1280x960x24" \
     qgis --nologo --noversioncheck --code "$hosts/in_qgis_desktop.py" >"$work/log" 2>&1 || fail "QGIS: $(cat "$work/log")"
 verify "the context menu's export" "$work/desktop/records/by_menu.reference.gpkg" "$work/desktop/by_menu.gpkg" \
     --record "$work/desktop/records/by_menu.json"
-passed "QGIS shows dialog, displacements and patches"
+passed "QGIS shows dialog, vertices and patches"

@@ -54,6 +54,60 @@ fn a_copy_names_its_recipient_and_an_average_all_members() {
     assert_eq!(report["candidates"]["tried"], 4);
 }
 
+/// The middle of the places along x.
+fn middle(places: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    (low + high) / 2.0
+}
+
+#[test]
+fn a_mosaic_is_drawn_by_whose_copy_each_part_comes_from() {
+    let host = copies();
+    let [west, east] = ["0.gpkg", "1.gpkg"].map(|name| Map::read(&host.path(name)).unwrap());
+    let border = middle(west.coords().map(|[x, _]| x));
+    let mut of_east = east.coords();
+    let mosaic = west.map_coords(|own| {
+        let other = of_east.next().unwrap();
+        if own[0] < border { own } else { other }
+    });
+    mosaic.write(&host.path("mosaic.gpkg")).unwrap();
+    let files = ["--report", "report.json", "--evidence-map", "evidence.gpkg", "mosaic.gpkg"];
+    host.matches("map.gpkg", &[&["--records", "records"], &files[..]].concat());
+    let report: Value = serde_json::from_slice(&std::fs::read(host.path("report.json")).unwrap()).unwrap();
+    let evidence = &report["evidence"];
+    let members: Vec<&str> =
+        evidence["members"].as_array().unwrap().iter().map(|m| m["recipient"].as_str().unwrap()).collect();
+    assert_eq!(members, RECIPIENTS[..2]);
+    let patches = evidence["patches"].as_array().unwrap().iter();
+    let mut sides = [0; 2];
+    for (patch, owner) in patches.zip(evidence["patch_members"].as_array().unwrap()) {
+        let xs = || patch["outline"].as_array().unwrap().iter().map(|place| place[0].as_f64().unwrap());
+        let side = usize::from(middle(xs()) > border);
+        let is_crossed = xs().any(|x| x < border) && xs().any(|x| x > border);
+        assert!(is_crossed || owner.as_u64() == Some(side as u64), "{patch} {owner}");
+        sides[side] += usize::from(!is_crossed);
+    }
+    assert!(sides[0] > 0 && sides[1] > 0, "{sides:?}");
+
+    let query = "SELECT recipient FROM patches ORDER BY patch";
+    let run = host.run("ogrinfo", &["-q", "-sql", query, "evidence.gpkg"]).succeeds();
+    let named = |name: &str| run.stdout.matches(&format!("= {name}")).count();
+    let owned = |number: u64| {
+        let owners = evidence["patch_members"].as_array().unwrap().iter();
+        owners.filter(|owner| owner.as_u64() == Some(number)).count()
+    };
+    assert_eq!([named(RECIPIENTS[0]), named(RECIPIENTS[1])], [owned(0), owned(1)], "{}", run.stdout);
+
+    let page = ["--records", "records", "--report", "report.html", "mosaic.gpkg"];
+    host.matches("map.gpkg", &page);
+    let page = std::fs::read_to_string(host.path("report.html")).unwrap();
+    assert!(page.contains("Whose copies were mixed.") && page.contains("<b>B</b>"));
+    // A single copy has one member and nothing to tell apart.
+    host.matches("map.gpkg", &["--records", "records", "--report", "single.html", "0.gpkg"]);
+    let page = std::fs::read_to_string(host.path("single.html")).unwrap();
+    assert!(!page.contains("Whose copies were mixed."));
+}
+
 #[test]
 fn every_mixture_of_copies_names_its_members_and_nobody_else() {
     let host = copies();

@@ -1,10 +1,15 @@
 """The styles of the evidence layers: colours for colour-blind readers (Okabe and Ito 2008)."""
 
+import itertools
+
 from qgis.core import (
     QgsArrowSymbolLayer,
+    QgsExpression,
     QgsFillSymbol,
     QgsGeometryGeneratorSymbolLayer,
+    QgsLayerTreeLayer,
     QgsLineSymbol,
+    QgsMarkerSymbol,
     QgsProcessingLayerPostProcessorInterface,
     QgsRuleBasedRenderer,
     QgsVectorLayerUtils,
@@ -13,6 +18,8 @@ from qgis.PyQt.QtGui import QColor
 
 from .text import tr
 
+# Colours of recipients.
+COLOURS = ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"]
 # Length of an arrow of typical displacement on the screen, metres.
 ARROW_M = 0.003
 
@@ -22,18 +29,37 @@ def displacements(layer):
     values, _ = QgsVectorLayerUtils.getValues(layer, "moved_m")
     rms_m = (sum(v * v for v in values) / len(values)) ** 0.5 if values else 0.0
     exaggeration = f"{ARROW_M / rms_m if rms_m > 0 else 1.0!r} * @map_scale"
+    return by_weight(lambda colour: arrow(colour, exaggeration))
+
+
+def matched_vertices(_layer):
+    """Returns a renderer of points; colours show the weight."""
+    return by_weight(point)
+
+
+def by_weight(symbol):
     return rules(
         [
-            (tr("agrees with its neighbours"), '"weight" >= 0.9', arrow("#0072b2", exaggeration)),
-            (tr("agrees less"), '"weight" >= 0.5 AND "weight" < 0.9', arrow("#e69f00", exaggeration)),
-            (tr("does not agree"), '"weight" < 0.5', arrow("#d55e00", exaggeration)),
+            (tr("agrees with its neighbours"), '"weight" >= 0.9', symbol("#0072b2")),
+            (tr("agrees less"), '"weight" >= 0.5 AND "weight" < 0.9', symbol("#e69f00")),
+            (tr("does not agree"), '"weight" < 0.5', symbol("#d55e00")),
         ]
     )
 
 
-def patches(_layer):
-    """Returns a renderer that colours patches by score, which is standard normal under a wrong key:
-    one patch of 30 000 exceeds 4."""
+def point(colour):
+    return QgsMarkerSymbol.createSimple({"color": colour, "size": "1.4", "outline_style": "no"})
+
+
+def patches(layer):
+    """Returns a renderer that colours patches by recipient where the copies of several are mixed, and
+    otherwise by score, which is standard normal under a wrong key: one patch of 30 000 exceeds 4."""
+    values, _ = QgsVectorLayerUtils.getValues(layer, "recipient")
+    recipients = sorted({value for value in values if isinstance(value, str)})
+    if len(recipients) > 1:
+        colours = zip(recipients, itertools.cycle(COLOURS))
+        owned = [(name, f'"recipient" = {QgsExpression.quotedValue(name)}', area(c, 110)) for name, c in colours]
+        return rules([*owned, (tr("several recipients, or none"), '"recipient" IS NULL', area("#999999", 30))])
     return rules(
         [
             (tr("clear evidence (6 and more)"), '"score" >= 6', area("#0072b2", 110)),
@@ -87,32 +113,32 @@ def file_of(layer):
     return layer.source().partition("|")[0]
 
 
-def show_above(layer):
-    """Moves a layer above those of the same file, as QGIS places it by version and selection."""
+def show_vertices_above(layer):
+    """Moves vertices above the patches of the same file: QGIS places and loads layers in an order of its own."""
     node = layer.project().layerTreeRoot().findLayer(layer.id()) if layer.project() else None
     if node is None:
         return
     group = node.parent()
-    of_file = [other for other in group.findLayers() if other.layer() and file_of(other.layer()) == file_of(layer)]
-    first = min(group.children().index(other) for other in of_file if other.parent() == group)
-    if group.children().index(node) > first:
-        group.insertChildNode(first, node.clone())
-        group.removeChildNode(node)
+    nodes = [other for other in group.children() if isinstance(other, QgsLayerTreeLayer) and other.layer()]
+    nodes = [other for other in nodes if file_of(other.layer()) == file_of(layer)]
+    first = min(group.children().index(other) for other in nodes)
+    for vertices in [other for other in nodes if not other.layer().source().endswith("|layername=patches")]:
+        if group.children().index(vertices) > first:
+            group.insertChildNode(first, vertices.clone())
+            group.removeChildNode(vertices)
 
 
 class Styler(QgsProcessingLayerPostProcessorInterface):
     """Sets style and place of a layer when it is added to the project."""
 
-    def __init__(self, renderer_of, is_above):
+    def __init__(self, renderer_of):
         super().__init__()
         self._renderer_of = renderer_of
-        self._is_above = is_above
 
     def postProcessLayer(self, layer, context, feedback):
         layer.setRenderer(self._renderer_of(layer))
         layer.triggerRepaint()
-        if self._is_above:
-            show_above(layer)
+        show_vertices_above(layer)
 
 
 # These references keep post-processors alive until their layer is loaded; QGIS deletes them then,
@@ -122,6 +148,6 @@ _STYLERS = {}
 
 def processor(name):
     """Returns a post-processor for the layer of this name."""
-    is_above = name == "vertex_displacements"
-    _STYLERS[name] = Styler(displacements if is_above else patches, is_above)
+    renderer_of = {"patches": patches, "matched_vertices": matched_vertices, "vertex_displacements": displacements}[name]
+    _STYLERS[name] = Styler(renderer_of)
     return _STYLERS[name]

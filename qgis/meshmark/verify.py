@@ -10,6 +10,7 @@ from qgis.core import (
     QgsProcessingException,
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
+    QgsProcessingParameterBoolean,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterVectorLayer,
@@ -21,6 +22,8 @@ from .text import tr
 
 # Exit codes with which the command gives a verdict: match, no match, inconclusive.
 VERDICTS = (0, 1, 3)
+# The parameter that asks for the exact displacements of vertices.
+EXACT = "EXACT_DISPLACEMENTS"
 
 
 class Verify(Algorithm):
@@ -33,9 +36,8 @@ class Verify(Algorithm):
         return tr(
             "Determines whether a suspect map is a copy that was marked with your key, and whose. With one record it"
             " tests that copy; with a folder of records it finds the recipient. The result is a verdict with the"
-            " probability that a map fits so well by chance, a report, and two layers: an arrow for the displacement"
-            " of every matched vertex, coloured by its agreement with its neighbours, and the patches of the mesh with"
-            " the evidence of each."
+            " probability that a map fits so well by chance, a report, and two layers: the matched vertices, coloured"
+            " by their agreement with their neighbours, and the patches of the mesh with the evidence of each."
         )
 
     def needs(self):
@@ -81,8 +83,15 @@ class Verify(Algorithm):
                 "EVIDENCE_MAP", tr("Evidence map"), tr("GeoPackage (*.gpkg)"), optional=True, createByDefault=True
             ),
             tr(
-                "The GeoPackage that receives the displacements of the matched vertices and the patches; both are"
-                " added to the project."
+                "The GeoPackage that receives the matched vertices and the patches; both are added to the project."
+            ),
+        )
+        self.add(
+            QgsProcessingParameterBoolean(EXACT, tr("Exact displacements"), False),
+            tr(
+                "Draws an arrow for the displacement of every matched vertex. With these displacements and the unmarked"
+                " map anyone can make the mark of this copy again: keep evidence map and report as secret as the"
+                " records."
             ),
         )
         reports.add_parameters(self)
@@ -114,7 +123,9 @@ class Verify(Algorithm):
             copies = [inputs.place(self._reference, "reference"), inputs.place(self._suspect, "suspect")]
             arguments = [commands.meshmark(), "verify", "--json"]
             arguments += ["--key", self.parameterAsString(given, "KEY", context), *self._marks(given, context)]
-            arguments += (["--evidence-map", evidence] if evidence else []) + self._report.options()
+            files = (["--evidence-map", evidence] if evidence else []) + self._report.options()
+            is_exact = bool(files) and self.parameterAsBool(given, EXACT, context)
+            arguments += files + (["--exact-displacements"] if is_exact else [])
             with commands.all_or_nothing([evidence, self._report.path, *copies]):
                 arguments += ["--reference", inputs.path(self._reference, "reference", context, feedback)]
                 arguments += ["--", inputs.path(self._suspect, "suspect", context, feedback)]
@@ -123,7 +134,7 @@ class Verify(Algorithm):
         for line in summary(found):
             feedback.pushInfo(line)
         if evidence and context.project():
-            self._add_layers(evidence, context)
+            self._add_layers(evidence, is_exact, context)
         results = {
             "VERDICT": found["verdict"],
             "REASON": found["reason"],
@@ -134,11 +145,10 @@ class Verify(Algorithm):
         written = {"EVIDENCE_MAP": evidence, "REPORT": self._report.path}
         return {**results, **{name: path for name, path in written.items() if path}}
 
-    def _add_layers(self, evidence, context):
-        for layer, title in [
-            ("patches", tr("Patches")),
-            ("vertex_displacements", tr("Displacements")),
-        ]:
+    def _add_layers(self, evidence, is_exact, context):
+        displacements = ("vertex_displacements", tr("Displacements"))
+        vertices = displacements if is_exact else ("matched_vertices", tr("Matched vertices"))
+        for layer, title in [("patches", tr("Patches")), vertices]:
             details = QgsProcessingContext.LayerDetails(title, context.project(), layer)
             details.setPostProcessor(styles.processor(layer))
             context.addLayerToLoadOnCompletion(f"{evidence}|layername={layer}", details)

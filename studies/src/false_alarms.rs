@@ -128,6 +128,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
         significance: 1e-6,
         sketch: false,
         evidence_map: false,
+        exact_displacements: false,
     };
     let mut progress = Progress::default();
     let map = verify::read_reference(&request, &mut progress)?.or_fail()?;

@@ -19,6 +19,11 @@ fn root() -> PathBuf {
 /// A folder with the test vectors in it.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
+    let vectors = folder.path().join("fingerprint");
+    fs::create_dir(&vectors).unwrap();
+    for file in ["record.json", "marked.gpkg"] {
+        fs::copy(root().join("fixtures/vectors/fingerprint").join(file), vectors.join(file)).unwrap();
+    }
     for file in
         ["kotka.gpkg", "helsinki.gpkg", "vectors/key.json", "vectors/record.json", "vectors/marked.gpkg"]
     {
@@ -117,6 +122,13 @@ fn the_page_of_a_match_is_as_written() {
     let page = page(folder.path(), &[&VERIFY[..], &RECORD, &["marked.gpkg"]].concat());
     assert!(page.contains("less than once in 4\u{a0}×\u{a0}10<sup>28</sup> tries, a number of 29 digits"));
     assert_golden("match.html", &page);
+}
+
+#[test]
+fn the_page_of_a_fingerprint_is_as_written() {
+    let folder = folder();
+    let record = ["--record", "fingerprint/record.json", "fingerprint/marked.gpkg"];
+    assert_golden("fingerprint.html", &page(folder.path(), &[&VERIFY[..], &record].concat()));
 }
 
 #[test]

@@ -176,12 +176,19 @@ fn report_files_are_valid_whatever_the_verdict() {
         vec![record[0], record[1], "--demodulator", "paper", "vectors/marked.gpkg"],
         vec![record[0], record[1], "kotka.gpkg"],
         vec![record[0], record[1], "helsinki.gpkg"],
+        vec![record[0], record[1], "--exact-displacements", "vectors/marked.gpkg"],
         vec!["--records", "vectors", "vectors/marked.gpkg"],
+        vec!["--records", "vectors/fingerprint", "vectors/fingerprint/marked.gpkg"],
         vec!["--layers", "buildings,landuse,roads", "--precision", "0.001", "vectors/marked.gpkg"],
     ] {
         let report = report_file(&[&verify[..], &arguments].concat());
         assert_valid("report", &report);
         assert_eq!(report["seconds"], Value::Null);
+        let sample = &report["evidence"]["sample"];
+        let exact = sample["displacements_m"].as_array().map(Vec::len);
+        let matched = sample["matched"].as_array().map(Vec::len);
+        let is_asked_for = arguments.contains(&"--exact-displacements");
+        assert_eq!(exact, matched.filter(|_| is_asked_for), "{arguments:?}");
         assert_closed(
             "report",
             &report,
@@ -192,8 +199,13 @@ fn report_files_are_valid_whatever_the_verdict() {
 
 #[test]
 fn the_report_file_of_a_comparison_is_valid() {
-    let report = report_file(&["compare", "kotka.gpkg", "vectors/marked.gpkg"]);
+    let compare = ["compare", "kotka.gpkg", "vectors/marked.gpkg"];
+    let exact = report_file(&[&compare[..], &["--exact-displacements"]].concat());
+    assert_valid("compare", &exact);
+    assert!(exact["detail"]["moved"].is_array());
+    let report = report_file(&compare);
     assert_valid("compare", &report);
+    assert_eq!(report["detail"]["moved"], Value::Null);
     assert_closed(
         "compare",
         &report,
@@ -360,7 +372,9 @@ fn reports_on_fingerprints_are_valid_for_every_verdict_and_hold_no_bits() {
         assert_eq!(report["fingerprint"].is_null(), verdict == "inconclusive");
     }
     let report = report("map with a fingerprint", &record);
-    assert_closed("report", &report, &["/fingerprint", "/fingerprint/recipient", "/fingerprint/patches"]);
+    let objects = ["", "/recipient", "/patches", "/recipient_decoys", "/key_decoys"];
+    let objects = objects.map(|object| format!("/fingerprint{object}"));
+    assert_closed("report", &report, &objects.each_ref().map(String::as_str));
     let changes = [
         ("/fingerprint/recipient/signs", json!(-1)),
         ("/fingerprint/key/p_log10", json!(0.5)),

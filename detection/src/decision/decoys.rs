@@ -1,8 +1,8 @@
-//! Decoys: the scores of nonexistent keys on the same suspect. The p-values rest on the analytic
-//! null distribution; the decoys show that it holds for this suspect.
+//! Decoys: the scores of nonexistent keys and recipients on the same suspect. The p-values rest on
+//! the analytic null distribution; the decoys show that it holds for this suspect.
 
 use crate::histogram::Histogram;
-use meshmark_core::{demodulation::Demodulation, hex, vertices::VertexTable};
+use meshmark_core::{agreement::Evidence, demodulation::Demodulation, hex, vertices::VertexTable};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -25,19 +25,36 @@ pub struct Decoys {
     pub largest: f64,
     /// Frequency of the scores.
     pub histogram: Histogram,
-    /// The score of the key and message in question; null when no message was expected.
+    /// The score of what is in question: key and message, recipient, or key. Null where none is.
     pub tested: Option<f64>,
 }
 
 impl Decoys {
-    /// Scores decoys on a suspect. Returns `None` where no displacement was observed.
+    /// Scores decoy keys on a suspect. Returns `None` where no displacement was observed.
     pub fn new(found: &Demodulation, suspect: &VertexTable, reference: &VertexTable) -> Option<Self> {
         if found.chip_correlations.iter().all(|a| *a == 0.0) {
             return None;
         }
+        Self::scored(suspect, reference, |seed| found.decoy_scores(COUNT, seed))
+    }
+
+    /// Scores decoys on estimates of signs: recipients on those of recipients, keys on pilots.
+    /// Returns `None` where no displacement was observed.
+    pub fn of_signs(evidence: &Evidence, suspect: &VertexTable, reference: &VertexTable) -> Option<Self> {
+        if evidence.energy() == 0.0 {
+            return None;
+        }
+        Self::scored(suspect, reference, |seed| evidence.decoy_scores(COUNT, seed))
+    }
+
+    fn scored(
+        suspect: &VertexTable,
+        reference: &VertexTable,
+        scores: impl FnOnce([u8; 32]) -> Vec<f64>,
+    ) -> Option<Self> {
         let text = format!("meshmark decoys {} {}", suspect.digest(), reference.digest());
         let seed: [u8; 32] = Sha256::digest(text).into();
-        let scores = found.decoy_scores(COUNT, seed);
+        let scores = scores(seed);
         let mean = scores.iter().sum::<f64>() / COUNT as f64;
         let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (COUNT - 1) as f64;
         Some(Decoys {

@@ -1,6 +1,8 @@
 //! Subcommands and their flags. The table of marking options generates the flags of those options.
 
-use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum, value_parser};
+use clap::{
+    Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, Parser, Subcommand, ValueEnum, value_parser,
+};
 use meshmark_core::options::{OPTIONS, OptionSpec, Spelling};
 use meshmark_detection::{Demodulator, registration::Start};
 use meshmark_verifier::ExitCode;
@@ -100,6 +102,10 @@ pub(super) struct CompareArgs {
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Include exact displacements of vertices in the report, which then must be kept as secret as
+    /// the records
+    #[arg(long, requires = "report")]
+    pub(super) exact_displacements: bool,
 }
 
 /// Where to start the registration.
@@ -145,6 +151,7 @@ impl From<DemodulatorArg> for Demodulator {
 }
 
 #[derive(Args)]
+#[command(group = ArgGroup::new("files").multiple(true).args(["report", "evidence_map"]))]
 pub(super) struct VerifyArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
@@ -183,13 +190,16 @@ pub(super) struct VerifyArgs {
     /// Describe in sentences what was compared, found and not tested
     #[arg(long, conflicts_with = "json")]
     pub(super) explain: bool,
-    /// GeoPackage to write: displacements of the matched vertices as lines, and the patches with
-    /// their scores
+    /// GeoPackage to write: the matched vertices, and the patches with their scores
     #[arg(long, value_name = "FILE")]
     pub(super) evidence_map: Option<PathBuf>,
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Include exact displacements of vertices in the report and the evidence map, which then must be
+    /// kept as secret as the records
+    #[arg(long, requires = "files")]
+    pub(super) exact_displacements: bool,
     /// Most memory of the examination, and the largest file that it writes; by default 1000 MB, 50 MB
     /// for each processor and 400 times the size of the maps, at most half of the machine's memory
     #[arg(long, value_name = "MB", value_parser = value_parser!(u64).range(1..))]

@@ -12,13 +12,13 @@ use clap::{CommandFactory, Parser};
 use meshmark_core::{counted, key::SecretKey, options::Options};
 use meshmark_verifier::{
     Error, Result,
-    compare::{Comparison, compare, detail::ComparedFiles},
+    compare::{Comparison, Details, compare, detail::ComparedFiles},
     distribute, html,
     inputs::{gdal_failures, texts},
     outputs::{Format, ReportFile},
     progress::Progress,
 };
-use printing::{print, warn};
+use printing::{print, warn, warn_of_displacements};
 use std::{
     io::{ErrorKind, Write},
     path::{Path, PathBuf},
@@ -82,8 +82,13 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
         .as_ref()
         .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line::own()))
         .transpose()?;
-    let mut comparison =
-        compare(&args.reference, &args.marked, layers.as_deref(), args.precision, file.is_some())?;
+    let details = match (&file, args.exact_displacements) {
+        (None, _) => Details::None,
+        (Some(_), false) => Details::Places,
+        (Some(_), true) => Details::Displacements,
+    };
+    warn_of_displacements(args.exact_displacements);
+    let mut comparison = compare(&args.reference, &args.marked, layers.as_deref(), args.precision, details)?;
     let detail = comparison.detail.take(); // only a report file holds it
     print(&if args.json { comparison.to_json() } else { comparison.to_text() })?;
     if let Some((file, mut detail)) = file.zip(detail) {

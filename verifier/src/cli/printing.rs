@@ -11,6 +11,16 @@ pub(super) fn warn(text: &str) {
     eprintln!("{WARNING}{}", printable(text));
 }
 
+/// Warns of outputs that hold exact displacements, where they are asked for.
+pub(super) fn warn_of_displacements(are_asked_for: bool) {
+    if are_asked_for {
+        warn(
+            "with exact displacements and the unmarked map anyone can make the mark of this copy again, and with the \
+             messages of other recipients theirs: keep the report and the evidence map as secret as the records",
+        );
+    }
+}
+
 /// Prints an answer. A reader may close the pipe before the end.
 pub(super) fn print(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();

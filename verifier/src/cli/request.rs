@@ -48,6 +48,7 @@ pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<R
             significance: args.significance,
             sketch: args.report.is_some(),
             evidence_map: args.evidence_map.is_some(),
+            exact_displacements: args.exact_displacements,
         })
     };
     possible.into_iter().map(request).collect()

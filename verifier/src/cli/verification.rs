@@ -3,7 +3,7 @@
 use super::{
     arguments::VerifyArgs,
     command_line,
-    printing::{WARNING, print, warn},
+    printing::{WARNING, print, warn, warn_of_displacements},
     request::requests,
 };
 use meshmark_verifier::{
@@ -26,6 +26,7 @@ const BY_SIGNAL: i32 = 128;
 pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
+    warn_of_displacements(args.exact_displacements);
     let suspect = PrivateCopy::of("suspect", &args.suspect)?;
     let arguments = command_line::of_examination(suspect.folder().as_os_str());
     let places = (args.suspect.as_path(), suspect.folder());
@@ -132,7 +133,7 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
             command: command_line::own(),
             versions: versions(),
         };
-        let report = Report { seconds: None, provenance: Some(provenance), evidence, ..report };
+        let report = Report { provenance: Some(provenance), evidence, ..report.into_file() };
         match format {
             Format::Html => html::verification(&report),
             Format::Json => report.to_json(),

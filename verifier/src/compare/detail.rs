@@ -32,10 +32,11 @@ pub struct Detail {
     pub displacement_m: Option<Histogram>,
     /// Changes of the angles at corners, degrees; null without corners.
     pub angle_change_deg: Option<Histogram>,
-    /// A sample of the vertices: x and y, CRS units, displacement in x and y, metres.
-    pub moved: Vec<[f64; 4]>,
+    /// A sample of the vertices: x and y, CRS units, displacement in x and y, metres; null unless
+    /// exact displacements are asked for.
+    pub moved: Option<Vec<[f64; 4]>>,
     /// Cells in which an angle turned by 1° or more: x and y of their middle, CRS units, and the
-    /// largest change, degrees.
+    /// largest change, whole degrees, rounded down.
     pub angle_cells: Vec<[f64; 3]>,
     /// Width and height of a cell, CRS units.
     pub cell: [f64; 2],
@@ -96,7 +97,8 @@ pub(super) struct Findings<'a> {
 }
 
 impl Findings<'_> {
-    pub fn detail(self) -> Detail {
+    /// Returns the places of differences; displacements only if they are `exact`.
+    pub fn detail(self, exact: bool) -> Detail {
         let (coords, extent) = (self.vertices.coords(), extent_of(self.vertices, self.measure));
         let pairs = coords.iter().zip(self.moved);
         let displacements: Vec<[f64; 2]> = pairs.map(|(a, b)| self.measure.metres_between(*a, *b)).collect();
@@ -114,7 +116,7 @@ impl Findings<'_> {
             extent,
             displacement_m: Histogram::of_values(&lengths, BINS),
             angle_change_deg: Histogram::of_values(&changes, BINS),
-            moved: shown.map(|(at, d)| [at[0], at[1], d[0], d[1]]).collect(),
+            moved: exact.then(|| shown.map(|(at, d)| [at[0], at[1], d[0], d[1]]).collect()),
             angle_cells: cells(&grid, self.corners),
             cell: grid.cell(),
             topology: Topology { torn, invalid, overlaps, crossings },
@@ -132,7 +134,7 @@ fn cells(grid: &PointGrid, corners: &[Corner]) -> Vec<[f64; 3]> {
     }
     let place = |(cell, change): (&[u32; 2], &f64)| {
         let [x, y] = grid.middle_of(*cell);
-        [x, y, *change]
+        [x, y, change.floor()]
     };
     largest.iter().map(place).collect()
 }

@@ -77,7 +77,18 @@ pub(crate) struct Pair {
     pub after: Outline,
 }
 
-/// Compares two files, and keeps the places of differences when `detailed`. `precision` is the cell
+/// The details of a comparison to keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Details {
+    /// The figures alone.
+    None,
+    /// The places of differences.
+    Places,
+    /// The places of differences, and exact displacements of vertices.
+    Displacements,
+}
+
+/// Compares two files, and keeps these details. `precision` is the cell
 /// size of the grid of the marked file, CRS units: overlaps up to a cell of it are slivers.
 ///
 /// # Errors
@@ -87,7 +98,7 @@ pub fn compare(
     marked: &Path,
     layers: Option<&[String]>,
     precision: Option<f64>,
-    detailed: bool,
+    details: Details,
 ) -> Result<Comparison> {
     let measure = &maps::ground(reference, layers)?;
     let (before, own) = maps::geometries("reference", reference, layers)?;
@@ -105,7 +116,7 @@ pub fn compare(
         return Err(Error::OtherCrs { path: marked.into(), own, other });
     }
     let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
-    Ok(Pairs { features, measure, grid: precision.unwrap_or(0.0) }.compare(detailed))
+    Ok(Pairs { features, measure, grid: precision.unwrap_or(0.0) }.compare(details))
 }
 
 fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
@@ -118,7 +129,7 @@ fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
 }
 
 impl Pairs<'_> {
-    fn compare(&self, detailed: bool) -> Comparison {
+    fn compare(&self, details: Details) -> Comparison {
         let all = |map: fn(&Pair) -> &Outline| {
             self.features.iter().flat_map(move |pair| map(pair).chains.iter().flatten().copied())
         };
@@ -137,7 +148,7 @@ impl Pairs<'_> {
         let Quality { areas, hausdorff, validity, overlaps, newly_invalid, newly_overlapping } =
             self.quality();
         let (crossings, crossing) = crossings::crossings(&segments, vertices.coords(), &moved, self.measure);
-        let detail = detailed.then(|| {
+        let detail = (details != Details::None).then(|| {
             let torn = vertices.coords().iter().zip(&torn).filter(|(_, torn)| **torn);
             let place = |number: &u32| self.features[*number as usize].before.first();
             let invalid = newly_invalid.iter().filter_map(place).collect();
@@ -150,7 +161,7 @@ impl Pairs<'_> {
                 corners: &corners,
                 places: [torn.map(|(at, _)| *at).collect(), invalid, overlapping, crossing],
             }
-            .detail()
+            .detail(details == Details::Displacements)
         });
         Comparison {
             meshmark_comparison: 1,

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::report::Report;
 use maud::{Markup, html};
-use meshmark_detection::{Histogram, round_up};
+use meshmark_detection::{Histogram, decision::Decoys, round_up};
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 480.0;
@@ -73,45 +73,74 @@ fn line(x: f64, name: &str) -> Markup {
     }
 }
 
-/// Draws the score and those of decoys.
+/// What decoys were tried for: how a page names one in question, and those that were made up.
+struct Kind {
+    wrong: &'static str,
+    made_up: &'static str,
+    tested: &'static str,
+    none_tested: &'static str,
+}
+
+const MESSAGES: Kind = Kind {
+    wrong: "a wrong key",
+    made_up: "keys that were made up",
+    tested: "key and message",
+    none_tested: "No message was expected, so the key in question has no score.",
+};
+const RECIPIENTS: Kind = Kind {
+    wrong: "a recipient who had no part",
+    made_up: "recipients who were made up",
+    tested: "recipient",
+    none_tested: "No recipient was named, so nobody has a score.",
+};
+const KEYS: Kind = Kind { tested: "key", none_tested: "", ..MESSAGES };
+
+/// Draws the scores of what is in question and those of decoys.
 pub fn decoys(report: &Report) -> Markup {
-    let content = match &report.decoys {
-        None => html! { p { "Nothing was demodulated, or nothing moved, so no key has a score." } },
-        Some(decoys) => {
-            let tested = decoys.tested;
-            let to = tested.map_or(5.0, |t| (t + 2.0).clamp(5.0, FARTHEST));
-            let broken = tested.is_some_and(|t| t > to);
-            let from = decoys.histogram.from.min(tested.unwrap_or(0.0)).min(-5.0).floor();
-            let chart = Chart {
-                histogram: &decoys.histogram,
-                from,
-                to,
-                label: "score, in standard deviations of a wrong key",
-            };
-            let more = html! {
-                path.law d=(normal(&chart, decoys.count)) {}
-                @if let Some(tested) = tested {
-                    (line(chart.x(tested.min(to - 1.0)), &format!("this key and message: {tested:.1}")))
-                    @if broken { path.break d=(format!("M{:.1} {}l6-14m4 14l6-14", chart.x(to - 4.0), HEIGHT + 7.0)) {} }
-                }
-            };
-            let caption = html! {
-                b { "The score among decoys. " }
-                (count(decoys.count)) " keys that were made up score " (format!("{:.2}", decoys.mean).replace('-', "−")) " on average, with a standard \
-                 deviation of " (format!("{:.2}", decoys.standard_deviation)) " and at most " (format!("{:.1}", decoys.largest))
-                "; the curve is the law that the probabilities rest on, mean 0 and standard deviation 1. "
-                @match tested {
-                    Some(tested) => {
-                        "The key and message in question score " (format!("{tested:.1}"))
-                        @if broken { ", beyond the break of the axis" } "."
-                    }
-                    None => { "No message was expected, so the key in question has no score." }
-                }
-            };
-            figure(&chart.draw(&more), &caption)
+    let all = match &report.fingerprint {
+        None => vec![(&report.decoys, MESSAGES)],
+        Some(fingerprint) => {
+            vec![(&fingerprint.recipient_decoys, RECIPIENTS), (&fingerprint.key_decoys, KEYS)]
         }
     };
+    let drawn: Vec<Markup> =
+        all.iter().filter_map(|(decoys, kind)| Some(among_decoys(decoys.as_ref()?, kind))).collect();
+    let content = html! {
+        @if drawn.is_empty() { p { "Nothing was demodulated, or nothing moved, so no key has a score." } }
+        @for figure in drawn { (figure) }
+    };
     section("The score against chance", &content)
+}
+
+fn among_decoys(decoys: &Decoys, kind: &Kind) -> Markup {
+    let tested = decoys.tested;
+    let to = tested.map_or(5.0, |t| (t + 2.0).clamp(5.0, FARTHEST));
+    let broken = tested.is_some_and(|t| t > to);
+    let from = decoys.histogram.from.min(tested.unwrap_or(0.0)).min(-5.0).floor();
+    let label = format!("score, in standard deviations of {}", kind.wrong);
+    let chart = Chart { histogram: &decoys.histogram, from, to, label: &label };
+    let more = html! {
+        path.law d=(normal(&chart, decoys.count)) {}
+        @if let Some(tested) = tested {
+            (line(chart.x(tested.min(to - 1.0)), &format!("this {}: {tested:.1}", kind.tested)))
+            @if broken { path.break d=(format!("M{:.1} {}l6-14m4 14l6-14", chart.x(to - 4.0), HEIGHT + 7.0)) {} }
+        }
+    };
+    let number = |value: f64, decimals: usize| format!("{value:.decimals$}").replace('-', "−");
+    let caption = html! {
+        b { "The score among decoys. " }
+        (count(decoys.count)) " " (kind.made_up) " score " (number(decoys.mean, 2)) " on average, with a standard \
+         deviation of " (number(decoys.standard_deviation, 2)) " and at most " (number(decoys.largest, 1))
+        "; the curve is the law that the probabilities rest on, mean 0 and standard deviation 1. "
+        @match tested {
+            Some(tested) => {
+                "The " (kind.tested) " in question " @if kind.tested.contains(" and ") { "score " } @else { "scores " } (number(tested, 1))
+                @if broken { ", beyond the break of the axis" } "."
+            }
+            None => (kind.none_tested),
+        }
+    };
+    figure(&chart.draw(&more), &caption)
 }
 
 /// Returns the path of the histogram that the normal distribution predicts.

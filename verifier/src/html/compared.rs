@@ -113,6 +113,7 @@ fn word(value: &impl serde::Serialize) -> String {
 
 fn tried(report: &Report, candidates: &Candidates) -> Markup {
     let significance = report.parameters.significance.log10();
+    let has_bits = candidates.list.iter().any(|entry| entry.bit_errors.is_some());
     html! {
         h3 { "Copies that were tried" }
         p {
@@ -127,20 +128,23 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                 " Files of the folder that are no such record and were left out: " (count(candidates.skipped)) "."
             }
             @if candidates.tried > candidates.list.len() {
-                " The best " (count(candidates.list.len())) " are listed."
+                @if candidates.matches > 0 { " Those that match are listed." } @else { " The nearest one is listed." }
+                @if let Some(p) = candidates.next_p_value_log10 {
+                    " The best of the others has a probability of " (words::probability(p)) "."
+                }
             }
         }
         table.list {
-            thead { tr { th { "Recipient" } th { "Record" } th.number { "Bits that differ" } th.number { "Probability" } th { "" } } }
+            thead { tr { th { "Recipient" } th { "Record" } @if has_bits { th.number { "Bits that differ" } } th.number { "Probability" } th { "" } } }
             tbody {
                 @for (number, entry) in candidates.list.iter().enumerate() {
                     tr {
                         td { @match &entry.recipient {
                             Some(recipient) => (clipped(recipient)),
-                            None => code { @if let Some(message) = &entry.message { (message) } },
+                            None => "–",
                         } }
                         td { (printable(&entry.record)) }
-                        td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } }
+                        @if has_bits { td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } } }
                         td.number { @if let Some(p) = entry.p_value_log10 { (words::probability(p)) } @else { "–" } }
                         td { @if number < candidates.matches && entry.p_value_log10.is_some_and(|p| p < significance) { b { "match" } } }
                     }

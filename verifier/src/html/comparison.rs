@@ -189,7 +189,10 @@ fn numbers(comparison: &Comparison) -> Markup {
 
 fn maps(detail: &Detail) -> Markup {
     let frame = Frame::new(&detail.extent);
-    html! { (angles(detail, &frame)) (moved(detail, &frame)) }
+    html! {
+        (angles(detail, &frame))
+        @if let Some(vertices) = &detail.moved { (moved(vertices, &frame)) }
+    }
 }
 
 /// Draws cells by the change of their angles, and the places of changed topology.
@@ -246,18 +249,19 @@ const KINDS: [Kind; 4] = [
     ("torn", "m0-40l40 40l-40 40l-40-40z", |t| &t.torn, "torn vertex"),
 ];
 
-fn moved(detail: &Detail, frame: &Frame) -> Markup {
-    let arrows = Arrows::fitting(frame, detail.moved.iter().map(|v| [v[2], v[3]]));
+fn moved(vertices: &[[f64; 4]], frame: &Frame) -> Markup {
+    let arrows = Arrows::fitting(frame, vertices.iter().map(|v| [v[2], v[3]]));
     let drawing = html! {
         svg.map.vertices viewBox=(frame.view_box()) role="img" aria-label="Map of displacements" {
             use href="#lines" {}
-            path.arrows d=(arrows.path(frame, &detail.moved)) {}
+            path.arrows d=(arrows.path(frame, vertices)) {}
             (frame.foot(arrows.key(frame).as_ref()))
         }
     };
     let caption = html! {
         b { "Displacement. " }
-        "How far vertices moved" (arrows.scale()) "; " (count(detail.moved.len())) " vertices are drawn."
+        "How far vertices moved" (arrows.scale()) "; " (count(vertices.len())) " vertices are drawn. "
+        b { "These displacements make the mark of this copy again: keep this report as secret as the records." }
     };
     figure(&drawing, &caption)
 }

@@ -1,7 +1,7 @@
 //! The agreement of the secret signs.
 
 use super::page::{count, section, table};
-use crate::report::{FingerprintEntry, PatchAgreement, Report, SignAgreement};
+use crate::report::{FingerprintEntry, PatchAgreement, Report, SignAgreement, explain::SECRET_SIGNS};
 use maud::{Markup, html};
 
 pub fn fingerprint(report: &Report) -> Markup {
@@ -13,7 +13,7 @@ pub fn fingerprint(report: &Report) -> Markup {
 }
 
 fn agreement(fingerprint: &FingerprintEntry) -> Markup {
-    let FingerprintEntry { recipient, key, patches } = fingerprint;
+    let FingerprintEntry { recipient, key, patches, .. } = fingerprint;
     let recipient = recipient.as_ref().map(signs);
     let patches = patches.map(|PatchAgreement { seen, clear }| {
         html! {
@@ -27,10 +27,7 @@ fn agreement(fingerprint: &FingerprintEntry) -> Markup {
         ("Patches", patches),
     ];
     html! {
-        p {
-            "Every coefficient of the mark has a secret sign that only the key can make. Those of a recipient who had no part \
-             in this map agree with it as the flips of a coin do. "
-        }
+        p { (SECRET_SIGNS) }
         (table(&rows.into_iter().filter(|(_, value)| value.is_some()).collect::<Vec<_>>()))
     }
 }

@@ -10,6 +10,8 @@ const SIDE: f64 = 4000.0;
 const FOOT: f64 = 230.0;
 /// From this number of points of rings and lines on, a map is drawn fainter.
 const DENSE: usize = 10_000;
+/// With more patches the labels of single ones are illegible.
+pub const MOST_LABELLED: usize = 60;
 /// White margin around the map.
 const MARGIN: f64 = 30.0;
 
@@ -36,6 +38,16 @@ impl Frame {
         let metres =
             [0, 1].map(|axis| (place[axis] - self.extent.lower[axis]) * self.extent.metres_per_unit[axis]);
         [metres[0] * self.per_metre, self.height - metres[1] * self.per_metre].map(|v| v.round() as i64)
+    }
+
+    /// Returns the page coordinates of the middle of an outline.
+    pub fn middle(&self, outline: &[[f64; 2]]) -> [i64; 2] {
+        self.at([0, 1].map(|axis| {
+            let values = outline.iter().map(|p| p[axis]);
+            let (low, high) =
+                values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+            low + (high - low) / 2.0
+        }))
     }
 
     /// Returns a length in metres as page units.

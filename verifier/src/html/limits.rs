@@ -4,7 +4,10 @@
 use super::page::{count, counted, section};
 use crate::report::{Report, explain};
 use maud::{Markup, html};
-use meshmark_detection::{Observations, decision::Verdict};
+use meshmark_detection::{
+    Observations,
+    decision::{Decoys, Verdict},
+};
 
 pub fn limits(report: &Report) -> Markup {
     html! {
@@ -43,7 +46,7 @@ fn weaknesses(report: &Report) -> Vec<String> {
              innocent: that also depends on who else had the copy, and on everything else that is known.",
         ),
         (
-            has_odds,
+            has_odds && report.fingerprint.is_none(),
             "For the key, the probability is that of the normal distribution; the exact one is at most 3.18 times as large, \
              whatever the map (Bentkus and Dzindzalieta 2015).",
         ),
@@ -73,6 +76,12 @@ fn weaknesses(report: &Report) -> Vec<String> {
     found
 }
 
+fn breaks_the_law(decoys: &Decoys) -> bool {
+    let error = 1.0 / (decoys.count as f64).sqrt();
+    let off = [decoys.mean, decoys.standard_deviation - 1.0];
+    off.iter().any(|off| off.abs() > STANDARD_ERRORS * error)
+}
+
 /// Returns weaknesses that this report shows.
 fn seen(report: &Report) -> Vec<String> {
     let mut found = Vec::new();
@@ -90,14 +99,11 @@ fn seen(report: &Report) -> Vec<String> {
             counted(v.reference, "vertex")
         ));
     }
-    if let Some(decoys) = &report.decoys {
-        let error = 1.0 / (decoys.count as f64).sqrt();
-        let mean_off = decoys.mean.abs() > STANDARD_ERRORS * error;
-        if mean_off || (decoys.standard_deviation - 1.0).abs() > STANDARD_ERRORS * error {
-            found.push(
-                "The decoys do not follow the law that the probabilities rest on: do not rely on the probabilities.".into(),
-            );
-        }
+    let of_signs = report.fingerprint.iter().flat_map(|f| [&f.recipient_decoys, &f.key_decoys]).flatten();
+    if report.decoys.iter().chain(of_signs).any(breaks_the_law) {
+        found.push(
+            "The decoys do not follow the law that the probabilities rest on: do not rely on the probabilities.".into(),
+        );
     }
     if let Some(errors) = report.bit_errors.filter(|errors| *errors > 0 && report.verdict == Verdict::Match) {
         let were = if errors == 1 { "was" } else { "were" };

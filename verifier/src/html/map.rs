@@ -1,16 +1,14 @@
 //! The evidence on the map: patches with their scores, vertices with their displacements.
 
 use super::{
-    frame::{Frame, largest_below, metres},
+    frame::{Frame, MOST_LABELLED, largest_below, metres},
+    members::members,
     page::{count, figure, section},
 };
-use crate::report::{Evidence, Report, sketch::PatchPlace};
+use crate::report::{Evidence, Report};
 use maud::{Markup, html};
 use meshmark_detection::decision::Verdict;
 use std::fmt::Write as _;
-
-/// With more patches the numbers of their scores are illegible.
-const MOST_NUMBERED: usize = 60;
 
 /// Classes of patches: the score from which a class begins, standard deviations, its name and its
 /// meaning.
@@ -28,6 +26,7 @@ pub fn evidence(report: &Report) -> Markup {
     let content = html! {
         (patterns())
         (patches(report, evidence, &frame))
+        (members(evidence, &frame))
         (vertices(report, evidence, &frame))
     };
     section("Where on the map the evidence is", &content)
@@ -69,9 +68,9 @@ fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
                     d=(frame.path(std::iter::once(&place.outline), true)) {}
             }
             (frame.lines(&evidence.sketch.lines))
-            @if scored && places.len() <= MOST_NUMBERED {
+            @if scored && places.len() <= MOST_LABELLED {
                 @for (number, place) in places.iter().enumerate() {
-                    @let [x, y] = frame.at(middle(place));
+                    @let [x, y] = frame.middle(&place.outline);
                     @if let Some(score) = score(number) { text x=(x) y=(y + 35) { (format!("{score:.1}").replace('-', "−")) } }
                 }
             }
@@ -94,7 +93,7 @@ fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
             (legend(evidence))
         } @else {
             "The reference and its " (count(places.len())) " patches. No patch has a score: nothing was demodulated, or no \
-             message was expected."
+             message and no recipient was in question."
         }
     };
     figure(&drawing, &caption)
@@ -113,27 +112,26 @@ fn legend(evidence: &Evidence) -> Markup {
     }
 }
 
-fn middle(place: &PatchPlace) -> [f64; 2] {
-    let ends = |axis: usize| {
-        let values = place.outline.iter().map(|p| p[axis]);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
-    };
-    [0, 1].map(|axis| {
-        let (low, high) = ends(axis);
-        low + (high - low) / 2.0
-    })
-}
-
 fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     let (sketch, sample) = (&evidence.sketch, &evidence.sketch.sample);
-    let arrows = Arrows::fitting(frame, sample.matched.iter().map(|v| [v[2], v[3]]));
+    let displaced = sample.displacements_m.as_ref().map(|displacements_m| {
+        let pairs = sample.matched.iter().zip(displacements_m);
+        pairs.map(|([x, y], [dx, dy])| [*x, *y, *dx, *dy]).collect::<Vec<_>>()
+    });
+    let arrows = displaced.map(|displaced| {
+        (Arrows::fitting(frame, displaced.iter().map(|[_, _, dx, dy]| [*dx, *dy])), displaced)
+    });
+    let key = arrows.as_ref().and_then(|(arrows, _)| arrows.key(frame));
     let drawing = html! {
         svg.map.vertices viewBox=(frame.view_box()) role="img" aria-label="Map of matched, missing and inserted vertices" {
             use href="#lines" {}
             path.missing d=(marks(frame, &sample.missing, CROSS)) {}
             path.inserted d=(marks(frame, &sample.inserted, TRIANGLE)) {}
-            path.arrows d=(arrows.path(frame, &sample.matched)) {}
-            (frame.foot(arrows.key(frame).as_ref()))
+            @match &arrows {
+                Some((arrows, displaced)) => path.arrows d=(arrows.path(frame, displaced)) {},
+                None => path.matched d=(marks(frame, &sample.matched, DOT)) {},
+            }
+            (frame.foot(key.as_ref()))
         }
     };
     let v = &report.vertices;
@@ -141,9 +139,18 @@ fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     let shown = |shown: usize, all: usize| html! { @if shown < all { ", " (count(shown)) " of them drawn" } };
     let caption = html! {
         b { "Vertices. " }
-        "How far each vertex of the reference is displaced in the suspect, after registration" (arrows.scale()) "."
+        @match &arrows {
+            Some((arrows, _)) => {
+                "How far each vertex of the reference is displaced in the suspect, after registration" (arrows.scale()) ". "
+                b { "These displacements make the mark of this copy again: keep this report as secret as the records." }
+            }
+            None => "Which vertices of the reference are in the suspect, after registration.",
+        }
         ul.legend {
-            li { (swatch("arrows", "M-40 20L30-15m-28-2l28 2l-14 24")) "matched: " (count(v.matched)) (shown(sample.matched.len(), v.matched)) }
+            li {
+                @match arrows { Some(_) => (swatch("arrows", "M-40 20L30-15m-28-2l28 2l-14 24")), None => (swatch("matched", &format!("M0 0{DOT}"))) }
+                "matched: " (count(v.matched)) (shown(sample.matched.len(), v.matched))
+            }
             li { (swatch("missing", &format!("M0 0{CROSS}"))) "missing from the suspect: " (count(sketch.missing)) (shown(sample.missing.len(), sketch.missing)) }
             li { (swatch("inserted", &format!("M0 0{TRIANGLE}"))) "only in the suspect: " (count(sketch.inserted)) (shown(sample.inserted.len(), sketch.inserted)) }
         }
@@ -151,6 +158,7 @@ fn vertices(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     figure(&drawing, &caption)
 }
 
+const DOT: &str = "m0-11l11 11l-11 11l-11-11z";
 const CROSS: &str = "m-14-14l28 28m0-28l-28 28";
 const TRIANGLE: &str = "m0-18l17 30h-34z";
 

@@ -31,9 +31,10 @@ fn decoded(report: &Report, message: &str) -> Markup {
             "The suspect was read as " code { (message) }
             @match (report.bit_errors, expected) {
                 (Some(0), _) => { ", the expected message to the last bit. " }
-                (Some(errors), Some(expected)) => {
-                    ", which differs from the expected " code { (expected) } " in " (count(errors)) " of "
-                    (count(report.bits.len())) " bits. "
+                (Some(errors), expected) => {
+                    ", which differs from the expected message "
+                    @if let Some(expected) = expected { code { (expected) } " " }
+                    "in " (count(errors)) " of " (count(report.bits.len())) " bits. "
                 }
                 _ => { "; no message was expected. " }
             }
@@ -83,7 +84,7 @@ fn legend(report: &Report) -> Markup {
         @if !report.shows_mark() { "These odds suppose a mark, which does not show. " }
         ul.legend {
             @for (_, class, text) in CLASSES { li { span.bit.(class) { "1" } (text) } }
-            @if report.bit_errors.is_some_and(|errors| errors > 0) {
+            @if report.expected_carried.is_some() && report.bit_errors.is_some_and(|errors| errors > 0) {
                 li { span.bit.s1.wrong { "1" } "differs from the expected message" }
             }
         }

@@ -8,6 +8,7 @@ mod fingerprint;
 mod frame;
 mod limits;
 mod map;
+mod members;
 mod message;
 mod page;
 mod registration;
@@ -28,9 +29,10 @@ pub fn verification(report: &Report) -> String {
         (compared::compared(report))
         (map::evidence(report))
         @match report.parameters.mark {
-            MarkParameters::Message(_) => { (message::message(report)) (chart::decoys(report)) }
+            MarkParameters::Message(_) => (message::message(report)),
             MarkParameters::Fingerprint(_) => (fingerprint::fingerprint(report)),
         }
+        (chart::decoys(report))
         (registration::registration(report))
         (compared::settings(report))
         (limits::limits(report))

@@ -16,7 +16,7 @@ pub fn registration(report: &Report) -> Markup {
         Method::Geometry => "by features of the same shape",
         Method::Curves => "by the course of its lines",
     };
-    let is_found = report.message.is_some();
+    let is_found = report.message.is_some() || report.fingerprint.is_some();
     let alignment = report.evidence.as_ref().filter(|_| is_found).map(|e| &e.sketch.alignment);
     let content = html! {
         p {

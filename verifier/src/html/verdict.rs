@@ -19,9 +19,10 @@ pub fn verdict(report: &Report) -> Markup {
             p.answer { (name(report.verdict)) }
             h1 { (sentence(report)) }
             @if report.verdict != Verdict::Match && report.shows_key() {
-                @match report.verdict {
-                    Verdict::NoMatch => p { "Some mark of this key is in the map, of another message or made with other options." }
-                    _ => p { "Some mark of this key is in the map, whatever its message." }
+                @match (report.verdict, &report.fingerprint) {
+                    (_, Some(_)) => p { "Some mark of this key is in the map, whoever its recipient is." }
+                    (Verdict::NoMatch, None) => p { "Some mark of this key is in the map, of another message or made with other options." }
+                    (_, None) => p { "Some mark of this key is in the map, whatever its message." }
                 }
             }
             (figures(report))
@@ -81,6 +82,7 @@ fn mark(report: &Report) -> Markup {
             }
             (_, Some(recipient), _) => { "the copy made for “" span.name { (clipped(recipient)) } "”" }
             (_, None, Some(message)) => { "the copy with the message " code { (message) } }
+            _ if report.is_of_somebody() => { "the copy that the record is of" }
             _ => { "key " code { (p.key_id) } }
         }
     }

@@ -1,6 +1,9 @@
 //! The evidence map as a GeoPackage, which appears completely or not at all.
 
-use crate::{Cause, Error, Result, report::EvidenceMap};
+use crate::{
+    Cause, Error, Result,
+    report::{EvidenceMap, ExactDisplacement, FoundVertex},
+};
 use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
@@ -67,7 +70,8 @@ fn workplace(path: &Path) -> Result<TempDir> {
     workplace.map_err(|error| Error::unwritten(path.display(), error))
 }
 
-/// Writes the layers `vertex_displacements`, a line for every matched vertex, and `patches`.
+/// Writes a layer with every matched vertex and the layer `patches`. The vertices are the points of
+/// `matched_vertices` or, with exact displacements, the lines of `vertex_displacements`.
 ///
 /// # Errors
 /// Fails when the file cannot be written.
@@ -78,9 +82,22 @@ pub fn write_evidence_map(map: &EvidenceMap, path: &Path) -> Result<()> {
 fn write_layers(map: &EvidenceMap, path: &Path) -> gdal::errors::Result<()> {
     gdal::config::set_thread_local_config_option("OGR_CURRENT_DATE", NO_TIME)?;
     let mut dataset = DriverManager::get_driver_by_name("GPKG")?.create_vector_only(path)?;
-    write_displacements(map, &mut dataset)?;
+    match map.has_displacements {
+        true => write_displacements(map, &mut dataset)?,
+        false => write_vertices(map, &mut dataset)?,
+    }
     write_patches(map, &mut dataset)?;
     dataset.close()
+}
+
+fn write_vertices(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+    let fields = [("patch", OGRFieldType::OFTInteger), ("weight", OGRFieldType::OFTReal)];
+    let (layer, rows) = (("matched_vertices", OGRwkbGeometryType::wkbPoint), map.vertices.iter());
+    write_layer(dataset, map.crs.as_ref(), layer, &fields, rows, |vertex, feature| {
+        feature.set_field_integer(0, vertex.patch as i32)?;
+        feature.set_field_double(1, vertex.weight)?;
+        point(vertex.at)
+    })
 }
 
 fn write_displacements(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
@@ -92,29 +109,35 @@ fn write_displacements(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors
         ("moved_m", OFTReal),
         ("weight", OFTReal),
     ];
-    let (kind, rows) = (OGRwkbGeometryType::wkbLineString, map.vertices.iter());
+    let displaced = |vertex: &FoundVertex| vertex.displacement.map(|displacement| (*vertex, displacement));
+    let (kind, rows) = (OGRwkbGeometryType::wkbLineString, map.vertices.iter().filter_map(displaced));
     write_layer(
         dataset,
         map.crs.as_ref(),
         ("vertex_displacements", kind),
         &fields,
         rows,
-        |vertex, feature| {
-            let [dx, dy] = vertex.moved_m;
+        |(vertex, ExactDisplacement { to, moved_m: [dx, dy] }), feature| {
             feature.set_field_integer(0, vertex.patch as i32)?;
             for (field, value) in (1..).zip([dx, dy, dx.hypot(dy), vertex.weight]) {
                 feature.set_field_double(field, value)?;
             }
             let mut line = Geometry::empty(kind)?;
-            [vertex.at, vertex.to].into_iter().for_each(|[x, y]| line.add_point_2d((x, y)));
+            [vertex.at, to].into_iter().for_each(|[x, y]| line.add_point_2d((x, y)));
             Ok(line)
         },
     )
 }
 
 fn write_patches(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
-    use OGRFieldType::{OFTInteger, OFTReal};
-    let fields = [("patch", OFTInteger), ("vertices", OFTInteger), ("found", OFTInteger), ("score", OFTReal)];
+    use OGRFieldType::{OFTInteger, OFTReal, OFTString};
+    let fields = [
+        ("patch", OFTInteger),
+        ("vertices", OFTInteger),
+        ("found", OFTInteger),
+        ("score", OFTReal),
+        ("recipient", OFTString),
+    ];
     let (kind, rows) = (OGRwkbGeometryType::wkbPolygon, map.patches.iter().enumerate());
     write_layer(dataset, map.crs.as_ref(), ("patches", kind), &fields, rows, |(number, patch), feature| {
         for (field, value) in [number, patch.vertices.len(), patch.found].into_iter().enumerate() {
@@ -122,6 +145,9 @@ fn write_patches(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Resu
         }
         if let Some(score) = patch.score {
             feature.set_field_double(3, score)?;
+        }
+        if let Some(recipient) = &patch.recipient {
+            feature.set_field_string(4, recipient)?;
         }
         points(&patch.vertices)?.convex_hull()
     })
@@ -152,12 +178,16 @@ fn write_layer<Row>(
 
 fn points(places: &[[f64; 2]]) -> gdal::errors::Result<Geometry> {
     let mut geometry = Geometry::empty(OGRwkbGeometryType::wkbMultiPoint)?;
-    for [x, y] in places {
-        let mut point = Geometry::empty(OGRwkbGeometryType::wkbPoint)?;
-        point.add_point_2d((*x, *y));
-        geometry.add_geometry(point)?;
+    for place in places {
+        geometry.add_geometry(point(*place)?)?;
     }
     Ok(geometry)
+}
+
+fn point([x, y]: [f64; 2]) -> gdal::errors::Result<Geometry> {
+    let mut point = Geometry::empty(OGRwkbGeometryType::wkbPoint)?;
+    point.add_point_2d((x, y));
+    Ok(point)
 }
 
 #[cfg(test)]

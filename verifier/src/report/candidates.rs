@@ -13,6 +13,8 @@ pub struct Candidates {
     pub skipped: usize,
     /// The best records, the most significant first.
     pub list: Vec<Entry>,
+    /// log₁₀ of the p-value of the best record that is not listed; null when there is none.
+    pub next_p_value_log10: Option<f64>,
     /// Number of records that match.
     #[serde(skip)]
     pub(crate) matches: usize,
@@ -25,15 +27,21 @@ pub struct Entry {
     pub record: String,
     /// Recipient; null when the message was given as bits.
     pub recipient: Option<String>,
-    /// Message, hexadecimal; null where the mark is a fingerprint.
-    pub message: Option<String>,
     /// log₁₀ of the p-value times the number of candidates; null when nothing was decoded.
     pub p_value_log10: Option<f64>,
-    /// Number of decoded bits that differ from the message; null when nothing was decoded.
+    /// Number of decoded bits that differ from the message of a record that matches; null otherwise.
     pub bit_errors: Option<usize>,
 }
 
 impl Candidates {
+    /// Returns what a report file holds, which others read: no name of a recipient whose record does
+    /// not match, but for the nearest one where none does.
+    pub(crate) fn into_file(mut self) -> Self {
+        let others = self.list.split_off(self.matches.max(1).min(self.list.len()));
+        self.next_p_value_log10 = others.first().map_or(self.next_p_value_log10, |next| next.p_value_log10);
+        self
+    }
+
     /// Returns lines of text.
     pub(crate) fn to_lines(&self) -> Vec<String> {
         let skipped = match self.skipped {
@@ -55,10 +63,10 @@ impl Candidates {
 
 impl Entry {
     pub(crate) fn name(&self) -> String {
-        let whose = match (&self.recipient, &self.message) {
-            (Some(recipient), _) => printable(recipient),
-            (None, message) => format!("message {}", message.as_deref().unwrap_or_default()),
-        };
-        format!("{whose} ({})", printable(&self.record))
+        let record = printable(&self.record);
+        match &self.recipient {
+            Some(recipient) => format!("{} ({record})", printable(recipient)),
+            None => record,
+        }
     }
 }

@@ -14,6 +14,20 @@ pub struct Evidence {
     /// exceeds that of a random key; null where no displacement was observed. Empty when nothing
     /// was decoded or no message was expected.
     pub patch_scores: Vec<Option<f64>>,
+    /// The recipients whose fingerprints are in the suspect: several where copies were mixed.
+    pub members: Vec<Member>,
+    /// For every patch, the number of the member whose copy it comes from, counted from 0; null
+    /// where it is not clear. Empty without members.
+    pub patch_members: Vec<Option<usize>>,
+}
+
+/// A recipient whose fingerprint is in the suspect.
+#[derive(Debug, Clone, Serialize)]
+pub struct Member {
+    /// The recipient.
+    pub recipient: String,
+    /// The score of the recipient in each patch alone; null where nothing was observed.
+    pub patch_scores: Vec<Option<f64>>,
 }
 
 /// The compared data, and the means to repeat the verification.

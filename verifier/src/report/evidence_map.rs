@@ -10,12 +10,19 @@ pub struct FoundVertex {
     pub at: [f64; 2],
     /// The number of its patch.
     pub patch: usize,
-    /// Its place in the suspect after registration, CRS units.
-    pub to: [f64; 2],
-    /// The displacement between the two, metres on the ground.
-    pub moved_m: [f64; 2],
+    /// Its displacement; `None` unless exact displacements are asked for.
+    pub displacement: Option<ExactDisplacement>,
     /// The weight: 1, or less where the displacement disagrees with the others.
     pub weight: f64,
+}
+
+/// The exact displacement of a matched vertex.
+#[derive(Debug, Clone, Copy)]
+pub struct ExactDisplacement {
+    /// Its place in the suspect after registration, CRS units.
+    pub to: [f64; 2],
+    /// The displacement from the reference, metres on the ground.
+    pub moved_m: [f64; 2],
 }
 
 /// The evidence of one patch.
@@ -28,6 +35,8 @@ pub struct PatchEvidence {
     /// The score in standard deviations of a random key; `None` where no vertex matches or no
     /// message is expected.
     pub score: Option<f64>,
+    /// The recipient from whose copy the patch comes; `None` where it is not clear.
+    pub recipient: Option<String>,
 }
 
 /// The places of matched vertices, and the evidence of each patch.
@@ -37,15 +46,18 @@ pub struct EvidenceMap {
     pub crs: Option<CoordinateSystem>,
     /// Matched vertices in canonical order.
     pub vertices: Vec<FoundVertex>,
+    /// Whether the vertices have their exact displacements.
+    pub has_displacements: bool,
     /// All patches, with or without matched vertices.
     pub patches: Vec<PatchEvidence>,
 }
 
 impl EvidenceMap {
-    /// Adds the score of every patch for the expected message; without scores the map stays
-    /// unchanged.
-    pub fn scored(mut self, scores: Vec<Option<f64>>) -> Self {
+    /// Adds the score of every patch for the expected mark, and the recipient from whose copy it
+    /// comes; without these the map stays unchanged.
+    pub fn scored(mut self, scores: Vec<Option<f64>>, recipients: Vec<Option<String>>) -> Self {
         self.patches.iter_mut().zip(scores).for_each(|(patch, score)| patch.score = score);
+        self.patches.iter_mut().zip(recipients).for_each(|(patch, recipient)| patch.recipient = recipient);
         self
     }
 }

@@ -1,6 +1,6 @@
 //! The output of `--explain`: the report in sentences, for readers who depend on it.
 
-use super::Report;
+use super::{FingerprintEntry, MarkParameters, PatchAgreement, Report};
 use crate::{
     inputs::digests::Inputs,
     words::{clipped, power_of_ten},
@@ -14,7 +14,7 @@ pub fn explain(inputs: &Inputs, report: &Report) -> String {
     let sections = [
         ("What was compared", compared(inputs, report)),
         ("What was found", found(report)),
-        ("What the message is bound to", bound(report)),
+        (what_is_bound(report), bound(report)),
         ("What was not tested", NOT_TESTED.map(String::from).to_vec()),
         ("What makes this evidence", deposit(inputs, report)),
     ];
@@ -26,6 +26,14 @@ pub fn explain(inputs: &Inputs, report: &Report) -> String {
         });
     }
     text
+}
+
+/// Returns the heading of what a mark names.
+fn what_is_bound(report: &Report) -> &'static str {
+    match &report.parameters.mark {
+        MarkParameters::Message(_) => "What the message is bound to",
+        MarkParameters::Fingerprint(_) => "What the secret signs are bound to",
+    }
 }
 
 fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
@@ -99,10 +107,7 @@ fn found(report: &Report) -> Vec<String> {
         report.read_from()
     ));
     if let Some(fingerprint) = &report.fingerprint {
-        let recipient = fingerprint.recipient.map(|signs| signs.to_text("of the recipient"));
-        sentences.extend(recipient.map(|text| format!("The recipient: {text}.")));
-        sentences
-            .push(format!("The key: {}, whoever the recipient is.", fingerprint.key.to_text("of the key")));
+        sentences.extend(of_signs(fingerprint));
         sentences.extend(probabilities(report));
         sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
         return sentences;
@@ -121,6 +126,40 @@ fn found(report: &Report) -> Vec<String> {
     sentences.push(format!("The verdict is {}: {}.", report.verdict_name(), report.reason));
     sentences
 }
+
+/// Returns sentences about the secret signs of a fingerprint.
+fn of_signs(fingerprint: &FingerprintEntry) -> Vec<String> {
+    let mut sentences = vec![SECRET_SIGNS.into()];
+    let recipient = fingerprint.recipient.map(|signs| signs.to_text("of the recipient"));
+    sentences.extend(recipient.map(|text| format!("The recipient: {text}.")));
+    sentences.push(format!("The key: {}, whoever the recipient is.", fingerprint.key.to_text("of the key")));
+    sentences.extend(fingerprint.patches.map(|PatchAgreement { seen, clear }| {
+        format!(
+            "The map is divided into patches with secret signs of their own: {clear} of the {seen} that were seen show \
+             the recipient by themselves, by {} standard deviations or more.",
+            PatchAgreement::CLEAR
+        )
+    }));
+    let decoys = [
+        (&fingerprint.recipient_decoys, "recipients who do not exist", "the recipient in question"),
+        (&fingerprint.key_decoys, "keys that do not exist", "the key in question"),
+    ];
+    for (decoys, who, tested) in decoys {
+        let Some(decoys) = decoys else { continue };
+        let tested = decoys.tested.map_or(String::new(), |score| format!("; {tested} scores {score:.1}"));
+        sentences.push(format!(
+            "To check what chance does, {} {who} were tried on this suspect: they score {:.2} on average, with a \
+             standard deviation of {:.2} and at most {:.1}{tested}.",
+            decoys.count, decoys.mean, decoys.standard_deviation, decoys.largest
+        ));
+    }
+    sentences
+}
+
+/// What a fingerprint is, for readers who have to judge it.
+pub(crate) const SECRET_SIGNS: &str = "The mark moves the map along many patterns, each one way or the other. The key and the name of the recipient \
+     determine which way, the secret sign of the pattern, and without the key these signs cannot be computed or \
+     guessed. Those of somebody who had no part in the map agree with it as often as flips of a coin.";
 
 /// Returns sentences about the assumptions of the registration beyond an affine map.
 pub(crate) fn assumed(report: &Report) -> Vec<String> {
@@ -222,6 +261,11 @@ pub(crate) fn bound(report: &Report) -> Vec<String> {
              the two, and without the key nobody can choose it.",
             clipped(recipient)
         ),
+        (Some(recipient), None) if matches!(p.mark, MarkParameters::Message(_)) => format!(
+            "The message was computed again from the key and the recipient \"{}\": it is a keyed hash of the two, and \
+             without the key nobody can choose it.",
+            clipped(recipient)
+        ),
         (Some(recipient), None) => format!(
             "The secret signs were computed again from the key and the recipient \"{}\": without the key nobody can \
              make them.",
@@ -231,6 +275,11 @@ pub(crate) fn bound(report: &Report) -> Vec<String> {
             "The message {message} was given as bare bits: nothing in it names a recipient, and who received it must be \
              shown by other means."
         ),
+        _ if report.is_of_somebody() => {
+            "The message of the record was given as bare bits: nothing in it names a recipient, and who received it must \
+             be shown by other means."
+                .into()
+        }
         _ => "No message was expected, so no recipient is named.".into(),
     };
     vec![sentence]

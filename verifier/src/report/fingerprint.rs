@@ -1,11 +1,11 @@
 //! The agreement of secret signs, as part of the report.
 
 use meshmark_core::agreement::Agreement;
-use meshmark_detection::decision::recipients;
+use meshmark_detection::decision::{Decoys, recipients};
 use serde::Serialize;
 
 /// The evidence about a fingerprint.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct FingerprintEntry {
     /// The signs of the recipient; null where none is named.
     pub recipient: Option<SignAgreement>,
@@ -13,6 +13,10 @@ pub struct FingerprintEntry {
     pub key: SignAgreement,
     /// The patches whose signs were observed; null without a recipient.
     pub patches: Option<PatchAgreement>,
+    /// Scores of decoy recipients; null where no displacement was observed.
+    pub recipient_decoys: Option<Decoys>,
+    /// Scores of decoy keys; null where no displacement was observed.
+    pub key_decoys: Option<Decoys>,
 }
 
 /// How far secret signs agree with a suspect.
@@ -48,7 +52,7 @@ impl FingerprintEntry {
     }
 
     /// Returns lines of text.
-    pub(crate) fn to_lines(self) -> Vec<String> {
+    pub(crate) fn to_lines(&self) -> Vec<String> {
         if self.key.signs == 0 {
             return vec!["signs:        no secret sign shows, for nothing moved".into()];
         }

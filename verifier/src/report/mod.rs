@@ -11,8 +11,8 @@ pub mod sketch;
 mod text;
 
 pub use candidates::{Candidates, Entry};
-pub use evidence::{Evidence, Provenance};
-pub use evidence_map::{EvidenceMap, FoundVertex, PatchEvidence};
+pub use evidence::{Evidence, Member, Provenance};
+pub use evidence_map::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidence};
 pub use explain::explain;
 pub use extent::Extent;
 pub use fingerprint::{FingerprintEntry, PatchAgreement, SignAgreement};
@@ -200,6 +200,13 @@ impl Report {
     /// Returns one JSON object, followed by a line feed.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and strings are JSON") + "\n"
+    }
+
+    /// Returns the report as a file holds it, which is the same for the same input and which others
+    /// read.
+    pub fn into_file(self) -> Self {
+        let candidates = self.candidates.map(Candidates::into_file);
+        Report { seconds: None, candidates, ..self }
     }
 
     /// Returns the exit code of this verdict.

@@ -66,10 +66,13 @@ pub struct DeformationEntry {
 /// A sample of the vertices.
 #[derive(Debug, Clone, Serialize)]
 pub struct Sample {
-    /// Matched vertices: x and y in the reference, CRS units, displacement in x and y, metres.
-    pub matched: Vec<[f64; 4]>,
+    /// Matched vertices: their places in the reference, CRS units.
+    pub matched: Vec<[f64; 2]>,
+    /// The exact displacements of these, metres; null unless they are asked for.
+    pub displacements_m: Option<Vec<[f64; 2]>>,
     /// Reference vertices without a match, CRS units.
     pub missing: Vec<[f64; 2]>,
-    /// Suspect vertices without a match, within the extent of the reference, CRS units.
+    /// The middles of cells that hold suspect vertices without a match, within the extent of the
+    /// reference, CRS units.
     pub inserted: Vec<[f64; 2]>,
 }

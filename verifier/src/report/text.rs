@@ -105,7 +105,7 @@ impl Report {
 
     /// Returns the other reading of the message, where it is unknown whether the key whitened it.
     pub(crate) fn other_reading(&self) -> String {
-        let other = self.unwhitened_message.as_ref().filter(|_| self.parameters.expected_message.is_none());
+        let other = self.unwhitened_message.as_ref().filter(|_| self.null_hypothesis.is_none());
         other.map_or(String::new(), |other| format!(", or {other} if the copy was marked with MESSAGE"))
     }
 
@@ -143,7 +143,7 @@ impl Report {
 
     /// Returns whether a copy was sought, and not a key alone.
     pub(crate) fn is_of_somebody(&self) -> bool {
-        self.parameters.expected_message.is_some() || self.parameters.recipient.is_some()
+        self.null_hypothesis.is_some() || self.parameters.recipient.is_some()
     }
 
     pub(crate) fn verdict_name(&self) -> &'static str {

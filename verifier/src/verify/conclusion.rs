@@ -1,13 +1,15 @@
 //! The conclusion: a report on examination and decision, including all that needs the secret key.
 
 use super::{
+    disclosed,
     evidence::{FingerprintEvidence, Found, MessageEvidence},
     examination::Examination,
+    members::Members,
     request::{Request, Sought},
 };
 use crate::report::{
-    Certainty, CodeEntry, Evidence, FingerprintEntry, MarkParameters, PatchAgreement, Report,
-    ReportParameters,
+    Certainty, CodeEntry, Evidence, FingerprintEntry, MarkParameters, Member, PatchAgreement, Report,
+    ReportParameters, SignAgreement,
 };
 use meshmark_core::{carrier::Carrier, fingerprint_record::FingerprintShape, message::Message};
 use meshmark_detection::{
@@ -32,7 +34,9 @@ pub fn conclude(
         Some(subject) => subject.message_of(carried, &request.key),
         None => carried.clone(),
     };
-    let tested = found.zip(expected).map(|(found, expected)| found.mark_score(expected));
+    let tested = found.zip(expected).map(|(found, expected)| disclosed::score(found.mark_score(expected)));
+    let is_match = decision.verdict == Verdict::Match;
+    let p = |exact: Option<f64>| disclosed::p_log10(exact, is_match);
     let code = CodeEntry {
         name: request.parameters.code,
         channel_bit_errors: found.zip(expected).map(|(found, m)| found.channel_bit_errors(m)),
@@ -46,23 +50,29 @@ pub fn conclude(
     };
     let decoys = evidence.and_then(|MessageEvidence { decoys, .. }| decoys.clone());
     Report {
-        p_value_log10: decision.p_value_log10(),
-        p_mark_log10: decision.p_mark_log10,
-        p_recipient_log10: decision.p_recipient_log10,
+        p_value_log10: p(decision.p_value_log10()),
+        p_mark_log10: p(decision.p_mark_log10),
+        p_recipient_log10: p(decision.p_recipient_log10),
         p_missed_log10: decision.p_missed_log10,
-        p_any_message_log10: found.and_then(|f| p_any_message_log10(f, request.parameters.chip_rate)),
+        p_any_message_log10: p(found.and_then(|f| p_any_message_log10(f, request.parameters.chip_rate))),
         decoys: decoys.map(|decoys| Decoys { tested, ..decoys }),
         message: carried.map(|carried| read(carried).to_hex()),
         carried_message: carried.map(Message::to_hex),
         unwhitened_message: carried.map(|carried| request.key.unwhitened(carried).to_hex()),
-        expected_carried: expected.map(Message::to_hex),
+        expected_carried: expected.filter(|_| is_match).map(Message::to_hex),
         null_hypothesis: hypothesis.as_ref().map(|hypothesis| hypothesis.null),
         tried: decision.tried,
         bit_errors: decoded.as_ref().zip(expected).map(|(decoded, m)| decoded.message.errors(m)),
         certainty: decoded.as_ref().and_then(|decoded| certainty(&decoded.message_llrs)),
-        bits: decoded.map(|decoded| decoded.message_llrs).unwrap_or_default(),
+        bits: decoded.iter().flat_map(|d| &d.message_llrs).map(|llr| disclosed::score(*llr)).collect(),
         code: Some(code),
-        ..report(request, seen, (decision.verdict, decision.reason), seconds, &patch_scores)
+        ..report(
+            request,
+            seen,
+            (decision.verdict, decision.reason),
+            seconds,
+            (&patch_scores, Members::default()),
+        )
     }
 }
 
@@ -79,31 +89,59 @@ pub fn conclude_fingerprint(
         Ok(Found::Message(_)) => unreachable!("a fingerprint is sought"),
         Err(reason) => {
             let answer = (Verdict::Inconclusive, reason.clone());
-            return report(request, seen, answer, seconds, &|_| Vec::new());
+            return report(request, seen, answer, seconds, (&|_| Vec::new(), Members::default()));
         }
     };
     let FingerprintEvidence { recipients, pilots, .. } = found;
+    let scored = |decoys: &Option<Decoys>, tested: Option<f64>| {
+        decoys.clone().map(|decoys| Decoys { tested: tested.map(disclosed::score), ..decoys })
+    };
+    let of_key = FingerprintEntry {
+        recipient: None,
+        key: (*pilots).into(),
+        patches: None,
+        recipient_decoys: scored(&found.recipient_decoys, None),
+        key_decoys: scored(&found.key_decoys, Some(pilots.score)),
+    };
     let Some((standing, answer)) = recipients.get(number) else {
-        let fingerprint = FingerprintEntry { recipient: None, key: (*pilots).into(), patches: None };
-        let answer = (Verdict::Inconclusive, without_recipient(fingerprint.shows_key()));
+        let answer = (Verdict::Inconclusive, without_recipient(of_key.shows_key()));
         return Report {
-            fingerprint: Some(fingerprint),
-            ..report(request, seen, answer, seconds, &|_| Vec::new())
+            fingerprint: Some(of_key),
+            ..report(request, seen, answer, seconds, (&|_| Vec::new(), Members::default()))
         };
     };
     let recipient = request.recipient().expect("a fingerprint is that of a recipient");
     let scores = found.patch_scores(&request.key, recipient);
-    let fingerprint = FingerprintEntry {
-        recipient: Some(standing.agreement.into()),
-        key: (*pilots).into(),
-        patches: Some(PatchAgreement::of(&scores)),
+    let is_match = answer.verdict == Verdict::Match;
+    let p = |exact: f64| disclosed::p_log10(Some(exact), is_match);
+    let of_recipient = SignAgreement::from(standing.agreement);
+    let of_recipient = match is_match {
+        true => of_recipient,
+        false => SignAgreement {
+            score: disclosed::score(of_recipient.score),
+            p_log10: p(of_recipient.p_log10).unwrap_or(0.0),
+            ..of_recipient
+        },
     };
+    let fingerprint = FingerprintEntry {
+        recipient: Some(of_recipient),
+        patches: Some(PatchAgreement::of(&scores)),
+        recipient_decoys: scored(&found.recipient_decoys, Some(standing.agreement.score)),
+        ..of_key
+    };
+    let members = Members::new(request, found);
     Report {
-        p_value_log10: Some(standing.p_value_log10),
-        p_recipient_log10: Some(standing.p_alone_log10),
+        p_value_log10: p(standing.p_value_log10),
+        p_recipient_log10: p(standing.p_alone_log10),
         p_missed_log10: answer.p_missed_log10,
         fingerprint: Some(fingerprint),
-        ..report(request, seen, (answer.verdict, answer.reason.clone()), seconds, &|_| scores.clone())
+        ..report(
+            request,
+            seen,
+            (answer.verdict, answer.reason.clone()),
+            seconds,
+            (&|_| scores.clone(), members),
+        )
     }
 }
 
@@ -122,9 +160,16 @@ fn report(
     seen: &Examination,
     (verdict, reason): (Verdict, String),
     seconds: &BTreeMap<&'static str, f64>,
-    patch_scores: &dyn Fn(usize) -> Vec<Option<f64>>,
+    (patch_scores, members): (&dyn Fn(usize) -> Vec<Option<f64>>, Members),
 ) -> Report {
     let (sketch, evidence_map) = (seen.sketch.clone(), seen.evidence_map.clone());
+    let disclosed =
+        |scores: Vec<Option<f64>>| scores.into_iter().map(|score| score.map(disclosed::score)).collect();
+    let patch_scores = |patches: usize| -> Vec<Option<f64>> { disclosed(patch_scores(patches)) };
+    let recipients = members.recipients();
+    let Members { members, of_patch } = members;
+    let of_member = |member: Member| Member { patch_scores: disclosed(member.patch_scores), ..member };
+    let members = members.into_iter().map(of_member).collect();
     Report {
         meshmark_report: 1,
         verdict,
@@ -147,10 +192,15 @@ fn report(
         registration: seen.registration.clone(),
         vertices: seen.vertices,
         left_out: seen.left_out.clone().into(),
-        parameters: report_parameters(request, seen),
+        parameters: report_parameters(request, seen, verdict),
         seconds: Some(seconds.clone()),
         provenance: None,
-        evidence: sketch.map(|sketch| Evidence { patch_scores: patch_scores(sketch.patches.len()), sketch }),
+        evidence: sketch.map(|sketch| Evidence {
+            patch_scores: patch_scores(sketch.patches.len()),
+            members,
+            patch_members: of_patch,
+            sketch,
+        }),
         tried: 1,
         certainty: None,
         expected_carried: None,
@@ -159,7 +209,7 @@ fn report(
         suspect_crs: seen.suspect_crs.clone(),
         evidence_map: evidence_map.map(|map| {
             let scores = patch_scores(map.patches.len());
-            map.scored(scores)
+            map.scored(scores, recipients)
         }),
     }
 }
@@ -175,11 +225,14 @@ fn certainty(llrs: &[f64]) -> Option<Certainty> {
     })
 }
 
-fn report_parameters(request: &Request, seen: &Examination) -> ReportParameters {
+fn report_parameters(request: &Request, seen: &Examination, verdict: Verdict) -> ReportParameters {
+    // The message of another copy, together with the leaked one, makes the mark of that copy.
+    let is_disclosed = verdict == Verdict::Match || request.is_message_given();
+    let subject = request.subject.as_ref().filter(|_| is_disclosed);
     let (mark, expected_message) = match &request.sought {
         Sought::Message { .. } => (
             MarkParameters::Message(request.parameters.clone()),
-            request.subject.as_ref().map(|subject| subject.message(&request.key).to_hex()),
+            subject.map(|subject| subject.message(&request.key).to_hex()),
         ),
         Sought::Fingerprint { coefficients, .. } => {
             (MarkParameters::Fingerprint(FingerprintShape::new(*coefficients, &request.parameters)), None)

@@ -50,6 +50,10 @@ pub struct FingerprintEvidence {
     pub recipients: Vec<(Standing, Answer)>,
     /// The agreement of the key's pilots.
     pub pilots: Agreement,
+    /// Scores of decoy recipients; none where no displacement was observed.
+    pub recipient_decoys: Option<Decoys>,
+    /// Scores of decoy keys; none where no displacement was observed.
+    pub key_decoys: Option<Decoys>,
     /// Standard deviation of the noise, metres.
     pub noise_m: f64,
 }
@@ -118,8 +122,11 @@ fn of_fingerprints(
     let power =
         progress.listen(|listener| Power::of_fingerprint(matched, &seen, &pilots, parameters, listener))?;
     let of_pilots = Evidence::of_pilots(&seen.estimates);
-    let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
     let evidence = Evidence::of_recipients(&seen.estimates);
+    let (suspect, reference) = (&matched.suspect.vertices, &matched.reference.data.vertices);
+    let decoys = |evidence| Decoys::of_signs(evidence, suspect, reference);
+    let (recipient_decoys, key_decoys) = (decoys(&evidence), decoys(&of_pilots));
+    let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
     let grounds = Grounds::new(&evidence, of_pilots, power, (tried, significance));
     let mut standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
     if grounds.ask_for_bets(&standings) {
@@ -145,7 +152,8 @@ fn of_fingerprints(
     let noise_m = deformation.noise_m;
     let surroundings =
         Surroundings { radius, matches, deformation: Some(deformation), weights, observations };
-    let found = FingerprintEvidence { estimates, part, recipients, pilots, noise_m };
+    let found =
+        FingerprintEvidence { estimates, part, recipients, pilots, recipient_decoys, key_decoys, noise_m };
     Ok((Found::Fingerprint(found), surroundings))
 }
 

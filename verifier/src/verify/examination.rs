@@ -213,7 +213,8 @@ fn seen(
     let vertices = VertexCounts { reference: reference.len(), suspect, matched: matches.count };
     let deformation = around.and_then(|around| around.deformation);
     let weights = around.map_or(&[][..], |around| &around.weights);
-    let scene = drawing::Scene { matched, matches, deformation, weights };
+    let exact_displacements = request.exact_displacements;
+    let scene = drawing::Scene { matched, matches, deformation, weights, exact_displacements };
     let sketch = request.sketch.then(|| drawing::sketch(&scene, &registration));
     let evidence_map = request.evidence_map.then(|| drawing::evidence_map(&scene, crs));
     let observations = around.map(|around| around.observations);

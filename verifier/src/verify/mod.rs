@@ -10,9 +10,11 @@
 mod belonging;
 mod conclusion;
 mod crs_search;
+mod disclosed;
 mod drawing;
 mod evidence;
 mod examination;
+mod members;
 mod records;
 mod references;
 mod request;

@@ -6,6 +6,7 @@
 use super::{
     belonging::{check_key, is_made_from},
     conclusion::{conclude, conclude_fingerprint},
+    disclosed,
     evidence::Found,
     examination::{Examination, Suited, examine, read_reference},
     request::{Request, Sought},
@@ -374,8 +375,7 @@ fn overall(outcomes: &[Outcome]) -> Overall {
         (1, _) => best,
         _ => Overall {
             reason: format!(
-                "for {matches} of the records the probability that key and message fit so well by chance is below the \
-                 significance"
+                "for {matches} of the records the probability of so good a fit by chance is below the significance"
             ),
             ..best
         },
@@ -388,13 +388,17 @@ fn count_matches(outcomes: &[Outcome]) -> usize {
 
 fn listed(outcomes: &[Outcome], skipped: usize) -> Candidates {
     let matches = count_matches(outcomes);
-    let entry = |outcome: &Outcome| Entry {
-        record: outcome.candidate.file.clone(),
-        recipient: outcome.candidate.recipient(),
-        message: outcome.candidate.message.as_ref().map(Message::to_hex),
-        p_value_log10: outcome.answer.p_value_log10,
-        bit_errors: outcome.bit_errors,
+    let entry = |outcome: &Outcome| {
+        let is_match = outcome.answer.verdict == Verdict::Match;
+        Entry {
+            record: outcome.candidate.file.clone(),
+            recipient: outcome.candidate.recipient(),
+            p_value_log10: disclosed::p_log10(outcome.answer.p_value_log10, is_match),
+            bit_errors: outcome.bit_errors.filter(|_| is_match),
+        }
     };
-    let list = outcomes.iter().take(MOST_LISTED.max(matches)).map(entry).collect();
-    Candidates { tried: outcomes.len(), skipped, list, matches }
+    let mut entries = outcomes.iter().map(entry);
+    let list = entries.by_ref().take(MOST_LISTED.max(matches)).collect();
+    let next_p_value_log10 = entries.next().and_then(|next| next.p_value_log10);
+    Candidates { tried: outcomes.len(), skipped, list, next_p_value_log10, matches }
 }

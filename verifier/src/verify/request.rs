@@ -82,6 +82,8 @@ pub struct Request {
     pub sketch: bool,
     /// Whether to keep the evidence map.
     pub evidence_map: bool,
+    /// Whether these two hold the exact displacements of vertices.
+    pub exact_displacements: bool,
 }
 
 impl Request {
@@ -93,6 +95,11 @@ impl Request {
     /// Returns the recipient from which the message follows.
     pub fn recipient(&self) -> Option<&str> {
         self.subject.as_ref().and_then(Subject::recipient)
+    }
+
+    /// Returns whether the request itself gives the message, so that the command line holds it.
+    pub(super) fn is_message_given(&self) -> bool {
+        self.record.is_none() && self.subject.is_some() && self.recipient().is_none()
     }
 
     /// Returns the properties of a mark that carries a message of this length.

@@ -1,7 +1,7 @@
 //! The evidence map of a scene.
 
 use super::scene::Scene;
-use crate::report::{EvidenceMap, FoundVertex, PatchEvidence};
+use crate::report::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidence};
 use meshmark_core::patches::Patch;
 use meshmark_dataset::CoordinateSystem;
 
@@ -19,15 +19,20 @@ pub fn evidence_map(scene: &Scene, crs: Option<&CoordinateSystem>) -> EvidenceMa
         vertices: patch.vertices.iter().map(|&v| coords[v as usize]).collect(),
         found: 0,
         score: None,
+        recipient: None,
     };
     let patches = patches.iter().map(of_patch).collect();
-    let mut map = EvidenceMap { crs: crs.cloned(), vertices: Vec::new(), patches };
+    let has_displacements = scene.exact_displacements;
+    let mut map = EvidenceMap { crs: crs.cloned(), vertices: Vec::new(), has_displacements, patches };
     let moved_m = scene.displacements_m();
     for (v, &weight) in scene.weights.iter().enumerate() {
         let (Some(moved_m), at) = (moved_m[v], coords[v]) else { continue };
         let unit = ground.metres_per_unit(at);
         let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];
-        map.vertices.push(FoundVertex { at, to, patch: patch_of[v], moved_m, weight });
+        let displacement = has_displacements.then_some(ExactDisplacement { to, moved_m });
+        // A weight follows from the length of the displacement.
+        let weight = if has_displacements { weight } else { (10.0 * weight).round() / 10.0 };
+        map.vertices.push(FoundVertex { at, patch: patch_of[v], displacement, weight });
         map.patches[patch_of[v]].found += 1;
     }
     map

@@ -13,6 +13,8 @@ pub struct Scene<'a> {
     pub deformation: Option<Deformation>,
     /// The weight of every reference vertex; none where nothing was demodulated.
     pub weights: &'a [f64],
+    /// Whether the drawing may hold the exact displacement of a vertex.
+    pub exact_displacements: bool,
 }
 
 impl Scene<'_> {

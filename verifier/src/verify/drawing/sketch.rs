@@ -31,7 +31,7 @@ pub fn sketch(scene: &Scene, registration: &Registration) -> Sketch {
         }),
         missing: coords.len() - scene.matches.count,
         inserted: inserted.len(),
-        sample: sample(&extent, coords, &displacements, &inserted),
+        sample: sample(scene, &extent, &displacements, &inserted),
         lines: lines(&extent, coords, &reference.data.segments),
     }
 }
@@ -51,21 +51,27 @@ fn place(scene: &Scene, patch: &Patch) -> PatchPlace {
 const MARKS: usize = 72;
 
 fn sample(
+    scene: &Scene,
     extent: &Extent,
-    coords: &[[f64; 2]],
     displacements: &[Option<[f64; 2]>],
     inserted: &[[f64; 2]],
 ) -> Sample {
-    let (mut arrows, mut missing) = (PointGrid::new(extent, ARROWS), PointGrid::new(extent, MARKS));
-    let mut sample = Sample { matched: Vec::new(), missing: Vec::new(), inserted: Vec::new() };
-    for (&[x, y], displacement) in coords.iter().zip(displacements) {
+    let [mut arrows, mut missing, mut shown] =
+        [ARROWS, MARKS, MARKS].map(|cells| PointGrid::new(extent, cells));
+    let (mut matched, mut exact, mut unmatched) = (Vec::new(), Vec::new(), Vec::new());
+    for (&place, displacement) in scene.coords().iter().zip(displacements) {
         match displacement {
-            Some([dx, dy]) if arrows.takes([x, y]) => sample.matched.push([x, y, *dx, *dy]),
-            None if missing.takes([x, y]) => sample.missing.push([x, y]),
+            Some(displacement) if arrows.takes(place) => {
+                matched.push(place);
+                exact.push(*displacement);
+            }
+            None if missing.takes(place) => unmatched.push(place),
             _ => {}
         }
     }
-    let mut shown = PointGrid::new(extent, MARKS);
-    sample.inserted = inserted.iter().copied().filter(|place| shown.takes(*place)).collect();
-    sample
+    // Their exact places would be displacements, too, where the radius is small.
+    let inserted = inserted.iter().copied().filter(|place| shown.takes(*place)).collect::<Vec<_>>();
+    let inserted = inserted.into_iter().map(|place| shown.middle_of(shown.cell_of(place))).collect();
+    let displacements_m = scene.exact_displacements.then_some(exact);
+    Sample { matched, displacements_m, missing: unmatched, inserted }
 }
