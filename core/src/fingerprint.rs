@@ -59,6 +59,17 @@ impl Signs for Fingerprint {
     }
 }
 
+/// The pilots of a mark without the signs of its recipient, which are 0.
+#[derive(Clone, Copy)]
+pub struct PilotsAlone(pub Sequence);
+
+impl Signs for PilotsAlone {
+    fn signs(&self, patch: usize, axis: usize, count: usize) -> Vec<f64> {
+        let pilots = self.0.signs(patch, axis, count).into_iter().enumerate();
+        pilots.map(|(i, pilot)| if is_pilot(i + 1) { pilot } else { 0.0 }).collect()
+    }
+}
+
 /// The part of a marking for recipients that does not depend on the recipient.
 pub struct FingerprintEmbedding<'a> {
     groundwork: Groundwork<'a>,

@@ -7,7 +7,7 @@ use meshmark_core::{
     deformation::Prediction,
     embedding,
     estimation::Estimates,
-    fingerprint::{self, FingerprintEmbedding, check_score, embed, pilots, recipient_signs},
+    fingerprint::{self, FingerprintEmbedding, PilotsAlone, check_score, embed, pilots, recipient_signs},
     ground::Ground,
     key::SecretKey,
     map::Map,
@@ -247,4 +247,33 @@ fn every_member_of_a_mosaic_wins_and_the_others_win_no_more_often_than_they_may(
         let mean = others.iter().map(|wealth| 10f64.powf(*wealth)).sum::<f64>() / others.len() as f64;
         assert!(mean < 10.0, "{mixture}: {mean}");
     }
+}
+
+#[test]
+fn an_average_of_many_copies_shows_its_members_once_the_pilots_are_taken_out() {
+    const MEMBERS: usize = 24;
+    let town = town();
+    let map = town.on(&Ground::METRES, &Ground::METRES);
+    let (key, part, parameters) = (key(), PartDigest::of(&town.vertices), Parameters::of_fingerprint());
+    let name = |n: usize| format!("member {n}");
+    let copies: Vec<Vec<[f64; 2]>> = (0..MEMBERS)
+        .map(|n| embed(&map, &key, &name(n), COEFFICIENTS, &parameters).unwrap().coords)
+        .collect();
+    let mean = |v: usize| [0, 1].map(|a| copies.iter().map(|copy| copy[v][a]).sum::<f64>() / MEMBERS as f64);
+    let average: Vec<[f64; 2]> = (0..town.vertices.coords().len()).map(mean).collect();
+    let observed = displaced(&town, &average);
+    let patches = Patches::new(&map, &parameters).unwrap();
+    let pilots = PilotsAlone(pilots(&key, &part));
+    let of_pilots = displacements_m(&patches, &[pilots], COEFFICIENTS, &parameters).unwrap().remove(0);
+    let without = |(o, p): (&Option<[f64; 2]>, [f64; 2])| o.map(|o| [o[0] - p[0], o[1] - p[1]]);
+    let rest: Vec<_> = observed.iter().zip(of_pilots).map(without).collect();
+    let score = |seen: &[Option<[f64; 2]>], recipient: &str| {
+        let noise = Prediction::of_noise(0.001, seen.len());
+        let estimates = Estimates::new(&patches, seen, COEFFICIENTS, &parameters, &noise, &|_| ()).unwrap();
+        agreement(&town, &estimates, recipient).score
+    };
+    let sum = |seen: &[Option<[f64; 2]>]| (0..MEMBERS).map(|n| score(seen, &name(n))).sum::<f64>();
+    let (with, without) = (sum(&observed), sum(&rest));
+    assert!(without > 1.3 * with && without > 5.0 * MEMBERS as f64, "{with} {without}");
+    assert!((0..10).all(|n| score(&rest, &format!("other {n}")).abs() < 5.0));
 }

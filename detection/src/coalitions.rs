@@ -12,8 +12,14 @@ use crate::{
     matched::Matched,
 };
 use meshmark_core::{
-    Result, agreement::Evidence, fingerprint::Fingerprint, modulation::displacements_m, mosaic,
-    options::Parameters, signs::Sequence,
+    Result,
+    agreement::Evidence,
+    deformation::Prediction,
+    fingerprint::{Fingerprint, PilotsAlone},
+    modulation::displacements_m,
+    mosaic,
+    options::Parameters,
+    signs::Sequence,
 };
 
 /// A vertex this near to its place in a copy is that of the copy, metres. Those of other copies are
@@ -23,6 +29,9 @@ const SAME_M: f64 = 0.01;
 const LEAST_OWN: f64 = 0.01;
 /// Where the noise is larger, no vertex shows whose it is, metres.
 const MOST_NOISE_M: f64 = 0.1;
+/// The noise of copies that were mixed and not changed further, metres: averages have nearly none,
+/// medians and extremes that of their choice.
+const MIXED_NOISES_M: [f64; 3] = [0.001, 0.02, 0.1];
 /// Bets are repeated on what the named recipients left, so often at most.
 const MOST_ROUNDS: usize = 4;
 /// So many recipients and patches are bet on in about half a minute.
@@ -87,6 +96,10 @@ impl Matched<'_> {
         let (reference, suspect) = (self.reference.data.vertices.coords(), self.suspect.vertices.coords());
         let mut views = [suspect, &self.moved]
             .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
+        for noise_m in MIXED_NOISES_M {
+            let noise = Prediction::of_noise(noise_m, reference.len());
+            self.score_without_pilots((&views[0], &noise), candidates, pilots, parameters, tried, standings)?;
+        }
         let still = vec![[0.0; 2]; reference.len()];
         for round in 1..=MOST_ROUNDS {
             let chosen = self.chosen(standings);
@@ -104,6 +117,36 @@ impl Matched<'_> {
                 self.forget(view, &still, &new, parameters)?;
             }
         }
+        Ok(())
+    }
+
+    /// Scores all candidates with displacements of this noise alone, and without the pilots. An
+    /// average of many copies has the pilots of one copy and a mark of a few millimetres for each
+    /// member; as shapes that keep their angles have less freedom than there are signs, the pilots
+    /// disturb the estimates of all other signs.
+    fn score_without_pilots(
+        &self,
+        (observed, noise): (&[Option<[f64; 2]>], &Prediction),
+        candidates: &[Fingerprint],
+        pilots: &Sequence,
+        parameters: &Parameters,
+        (tried, significance): (usize, f64),
+        standings: &mut [Standing],
+    ) -> Result<()> {
+        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
+        let of_pilots = displacements_m(patches, &[PilotsAlone(*pilots)], coefficients, parameters)?;
+        let without =
+            |(o, pilot): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [0, 1].map(|axis| o[axis] - pilot[axis]));
+        let observed: Vec<_> = observed.iter().zip(&of_pilots[0]).map(without).collect();
+        let estimates = self.estimates(self.vertices(), &observed, noise, parameters, &|_| ())?;
+        let evidence = Evidence::of_recipients(&estimates);
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
+        let rest = |named: &[usize], _: &[usize]| {
+            Ok(evidence.without(&named.iter().map(|&k| signs[k]).collect::<Vec<_>>()))
+        };
+        let level = significance / 10f64.powf(recipients::FURTHER_TESTS_LOG10);
+        let again = recipients::name_in_rounds(&evidence, &signs, (tried, level), rest)?;
+        standings.iter_mut().zip(again).for_each(|(standing, again)| standing.take(again, significance));
         Ok(())
     }
 

@@ -24,9 +24,10 @@ use meshmark_core::{
 };
 use rayon::prelude::*;
 
-/// Bets have a hundredth of the error that scores have: their p-value is multiplied by 100, and both
-/// together err by at most 1.01 times the significance.
-const SHARE_OF_SCORES_LOG10: f64 = 2.0;
+/// Bets, and each of three scores without pilots, have a hundredth of the error that the first scores
+/// have: their p-values are multiplied by 100, and all together err by at most 1.04 times the
+/// significance.
+pub(crate) const FURTHER_TESTS_LOG10: f64 = 2.0;
 
 /// More rounds name nobody else: every round needs stronger evidence.
 const MOST_ROUNDS: usize = 20;
@@ -123,10 +124,21 @@ pub fn name_in_rounds(
 }
 
 impl Standing {
+    /// Takes the standing of the same candidate in further evidence, where it is the stronger one.
+    pub fn take(&mut self, further: Standing, significance: f64) {
+        let p_value_log10 = further.p_value_log10 + FURTHER_TESTS_LOG10;
+        if p_value_log10 < self.p_value_log10 {
+            let p_alone_log10 = (further.p_alone_log10 + FURTHER_TESTS_LOG10).min(0.0);
+            let is_named = p_value_log10 < significance.log10();
+            let Standing { score, round, .. } = further;
+            *self = Standing { score, round, p_alone_log10, p_value_log10, is_named, ..*self };
+        }
+    }
+
     /// Takes the wealth of a gambler in a round of bets, log₁₀, for evidence where it is stronger than
     /// the score. One of the `tried`, whose significance together is this one.
     pub fn bet(&mut self, wealth_log10: f64, round: usize, (tried, significance): (usize, f64)) {
-        let p_alone_log10 = (SHARE_OF_SCORES_LOG10 - wealth_log10).min(0.0);
+        let p_alone_log10 = (FURTHER_TESTS_LOG10 - wealth_log10).min(0.0);
         let factor_log10 = (tried as f64).log10() + rounds_log10(round, tried);
         let p_value_log10 = (p_alone_log10 + factor_log10).min(0.0);
         if p_value_log10 < self.p_value_log10 {
