@@ -22,6 +22,7 @@ use crate::{
     spectrum::Basis,
 };
 use rayon::prelude::*;
+use std::f64::consts::{LN_2, LN_10};
 
 /// What a gambler believes: the share of the recipient's coordinates, and the standard deviation of
 /// these from the recipient's copy, metres.
@@ -92,7 +93,7 @@ fn sum<'a>(patches: impl Iterator<Item = &'a Wealth>) -> Wealth {
 fn mean_log10(wealths: &[f64]) -> f64 {
     let most = wealths.iter().copied().fold(f64::MIN, f64::max);
     let mean = wealths.iter().map(|wealth| (wealth - most).exp()).sum::<f64>() / wealths.len() as f64;
-    (most + mean.ln()) / std::f64::consts::LN_10
+    (most + mean.ln()) / LN_10
 }
 
 /// A patch as a gambler sees it: coordinates, and what each sign contributes to them.
@@ -154,7 +155,8 @@ impl Table {
                     2.0 * weights.iter().zip(&rest).zip(column).map(|((w, r), c)| w * r * c).sum::<f64>();
                 for (wealth, trust) in wealth.iter_mut().zip(TRUST) {
                     // 2 P(sign)
-                    *wealth += std::f64::consts::LN_2 - (-trust * sign * odds).exp().ln_1p();
+                    let against = -trust * sign * odds;
+                    *wealth += LN_2 - against.max(0.0) - (-against.abs()).exp().ln_1p();
                 }
                 for ((rest, unknown), c) in rest.iter_mut().zip(&mut unknown).zip(column) {
                     *rest -= sign * c;

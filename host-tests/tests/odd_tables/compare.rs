@@ -73,12 +73,17 @@ fn without_places(host: &Host, file: &str) -> Vec<String> {
 /// place.
 fn dump(host: &Host, format: &str, file: &str) -> Vec<String> {
     let run = host.run("ogrinfo", &["-al", "-geom=NO", file]);
-    // The layer of a Shapefile has the name of its file.
-    let name = if format == "ESRI Shapefile" { "Layer name: " } else { "INFO: " };
+    let is_shapefile = format == "ESRI Shapefile"; // its layer has the name of the file
     let is_ours = |line: &&str| {
-        !["INFO: ", "Extent: ", "      using driver", name].iter().any(|start| line.starts_with(start))
+        let named = is_shapefile && line.starts_with("Layer name: ");
+        !named && !["INFO: ", "Extent: ", "      using driver"].iter().any(|start| line.starts_with(start))
     };
-    let text = run.stdout.lines().filter(is_ours).map(without_real_width).collect::<Vec<_>>().join("\n");
+    let without_name = |line: String| match line.rsplit_once("):") {
+        Some((start, id)) if is_shapefile && start.starts_with("OGRFeature(") => format!("OGRFeature:{id}"),
+        _ => line,
+    };
+    let lines = run.stdout.lines().filter(is_ours).map(without_real_width).map(without_name);
+    let text = lines.collect::<Vec<_>>().join("\n");
     if format != "FlatGeobuf" {
         return text.lines().map(String::from).collect();
     }

@@ -179,7 +179,7 @@ pub(super) struct VerifyArgs {
     pub(super) demodulator: DemodulatorArg,
     /// Radius within which vertices match, metres on the ground; by default it follows from the
     /// suspect
-    #[arg(long, value_name = "Ground::METRES", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "METRES", value_parser = positive, allow_negative_numbers = true)]
     pub(super) radius: Option<f64>,
     /// The verdict is match when the p-value is below this
     #[arg(long, value_name = "P", default_value_t = 1e-6, value_parser = probability, allow_negative_numbers = true)]
