@@ -19,8 +19,9 @@ fuzz_target!(|bytes: &[u8]| {
     assert_eq!(blob.len(), bytes.len());
     if let Ok(bounds) = bounds {
         assert_eq!(bounds.is_none(), places.is_empty());
-        let is_finite = places.as_flattened().iter().all(|value| value.is_finite());
-        let is_alike = || is_finite && read_by_gdal(&blob).is_some_and(|read| read == places);
+        // Far beyond all maps, the box that GDAL computes of an arc is off by its size.
+        let is_near = places.as_flattened().iter().all(|value| value.abs() < 1e12);
+        let is_alike = || is_near && read_by_gdal(&blob).is_some_and(|read| read == places);
         if let (Some([x0, x1, y0, y1]), true) = (bounds, is_alike()) {
             // GDAL computes the box of arcs, from rounded centres.
             let slack =
