@@ -13,6 +13,7 @@ use crate::{
     record::Distortion,
 };
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 /// The version of this record.
 pub const VERSION: u32 = 2;
@@ -141,8 +142,8 @@ impl FingerprintRecord {
     /// # Errors
     /// [`Error::Record`] describes the fault.
     pub fn from_json(text: &str) -> Result<Self> {
-        let record: FingerprintRecord =
-            serde_json::from_str(text).map_err(|error| Error::Record(RecordFault::Json(error)))?;
+        let read = serde_json::from_str(text).or_else(|error| with_nested_figures(text).ok_or(error));
+        let record: FingerprintRecord = read.map_err(|error| Error::Record(RecordFault::Json(error)))?;
         record.check()?;
         Ok(record)
     }
@@ -195,6 +196,15 @@ impl FingerprintRecord {
     }
 }
 
+/// Reads a record of the first version of this format, which had the figures of the distortion in an
+/// object of their own.
+fn with_nested_figures(text: &str) -> Option<FingerprintRecord> {
+    let mut record: Map<String, Value> = serde_json::from_str(text).ok()?;
+    let Value::Object(figures) = record.remove("distortion")? else { return None };
+    record.extend(figures);
+    serde_json::from_value(record.into()).ok()
+}
+
 fn is_digest(text: &str) -> bool {
     text.len() == 64 && text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f'))
 }
@@ -207,7 +217,7 @@ mod tests {
         record::TopologyEntry,
         vertices::VertexTable,
     };
-    use serde_json::{Value, json};
+    use serde_json::json;
 
     fn record() -> FingerprintRecord {
         let vertices = VertexTable::new(vec![[0.0, 1.0]]).unwrap();
@@ -252,6 +262,17 @@ mod tests {
         assert_eq!(read, record());
         assert!(read.is_of(&SecretKey::from_bytes([7; 32])) && !read.is_of(&SecretKey::from_bytes([8; 32])));
         assert_eq!(read.mark.parameters(), Parameters::of_fingerprint());
+    }
+
+    #[test]
+    fn a_record_with_the_figures_in_an_object_of_their_own_is_read() {
+        let mut json: Map<String, Value> = serde_json::from_str(&record().to_json()).unwrap();
+        let names = ["displacement", "angles", "areas", "hausdorff", "validity", "overlaps", "topology"];
+        let figures: Map<String, Value> =
+            names.map(|name| (name.to_string(), json.remove(name).unwrap())).into_iter().collect();
+        json.insert("distortion".into(), figures.into());
+        let text = Value::from(json).to_string();
+        assert_eq!(FingerprintRecord::from_json(&text).unwrap(), record());
     }
 
     #[test]

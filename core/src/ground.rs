@@ -54,8 +54,8 @@ impl Ground {
     }
 
     /// Returns the geocentric coordinates of a point of the ellipsoid, metres (EPSG method 9602);
-    /// `None` in a projected CRS. Unlike degrees, they are continuous across the 180th meridian and at the
-    /// poles.
+    /// `None` in a projected CRS. Unlike degrees, they are continuous across the 180th meridian and
+    /// at the poles.
     pub fn in_space(&self, point: [f64; 2]) -> Option<[f64; 3]> {
         let Ground::Ellipsoid { semi_major_m: a, semi_minor_m: b, radians_per_unit } = *self else {
             return None;

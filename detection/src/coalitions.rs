@@ -34,7 +34,7 @@ const MOST_NOISE_M: f64 = 0.1;
 const MIXED_NOISES_M: [f64; 3] = [0.001, 0.02, 0.1];
 /// Bets are repeated on what the named recipients left, so often at most.
 const MOST_ROUNDS: usize = 4;
-/// So many recipients and patches are bet on in about half a minute.
+/// So many pairs of a recipient and a patch are bet on in a round at most.
 const MOST_BETS: usize = 8000;
 /// Named recipients that leave less than this share of the energy explain the suspect.
 const LEAST_REST: f64 = 0.1;
@@ -65,7 +65,9 @@ impl Matched<'_> {
                 return Ok(rest);
             }
             let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k]).collect();
-            self.forget(&mut observed, &seen.disturbance.displacement_m, &new, parameters)?;
+            let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
+            let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
+            forget(&mut observed, &copies_m, |vertex| seen.disturbance.displacement_m[vertex]);
             let estimates =
                 self.estimates(self.vertices(), &observed, &seen.disturbance, parameters, &|_| ())?;
             Ok(Evidence::of_recipients(&estimates).without(&named))
@@ -73,11 +75,11 @@ impl Matched<'_> {
     }
 
     /// Bets on the signs of candidates that are not named, where a share of the coordinates may be
-    /// theirs: those with the best scores, as many as a minute allows. The suspect is seen as it
+    /// theirs: those with the best scores, up to [`MOST_BETS`]. The suspect is seen as it
     /// stands and as it is registered: the least values of many copies shift a map as a whole,
     /// which the registration undoes. No deformation is taken out, as that of polygon groups has
-    /// much of what the owners of single features put there. Vertices of recipients that are named count
-    /// as not found in the next round.
+    /// much of what the owners of single features put there. Vertices of recipients that are named
+    /// count as not found in the next round.
     ///
     /// # Errors
     /// Fails when a patch cannot be solved.
@@ -96,37 +98,32 @@ impl Matched<'_> {
         let (reference, suspect) = (self.reference.data.vertices.coords(), self.suspect.vertices.coords());
         let mut views = [suspect, &self.moved]
             .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
-        for noise_m in MIXED_NOISES_M {
-            let noise = Prediction::of_noise(noise_m, reference.len());
-            self.score_without_pilots((&views[0], &noise), candidates, pilots, parameters, tried, standings)?;
-        }
-        let still = vec![[0.0; 2]; reference.len()];
+        self.score_without_pilots(&views[0], candidates, pilots, parameters, tried, standings)?;
+        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
         for round in 1..=MOST_ROUNDS {
             let chosen = self.chosen(standings);
             let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own).collect();
-            let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
             let of_views = views.each_ref().map(Vec::as_slice);
             let wealth = mosaic::wealth_log10(patches, &of_views, coefficients, parameters, pilots, &signs)?;
             chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, round, tried));
             let new = chosen.iter().filter(|&&k| standings[k].is_named).map(|&k| candidates[k]);
             let new: Vec<Fingerprint> = new.collect();
-            if new.is_empty() || standings.iter().all(|standing| standing.is_named) {
+            if new.is_empty() || round == MOST_ROUNDS || standings.iter().all(|standing| standing.is_named) {
                 break;
             }
-            for view in &mut views {
-                self.forget(view, &still, &new, parameters)?;
-            }
+            let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
+            views.iter_mut().for_each(|view| forget(view, &copies_m, |_| [0.0; 2]));
         }
         Ok(())
     }
 
-    /// Scores all candidates with displacements of this noise alone, and without the pilots. An
+    /// Scores all candidates without the pilots, for each noise that mixtures may have. An
     /// average of many copies has the pilots of one copy and a mark of a few millimetres for each
     /// member; as shapes that keep their angles have less freedom than there are signs, the pilots
     /// disturb the estimates of all other signs.
     fn score_without_pilots(
         &self,
-        (observed, noise): (&[Option<[f64; 2]>], &Prediction),
+        observed: &[Option<[f64; 2]>],
         candidates: &[Fingerprint],
         pilots: &Sequence,
         parameters: &Parameters,
@@ -138,15 +135,18 @@ impl Matched<'_> {
         let without =
             |(o, pilot): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [0, 1].map(|axis| o[axis] - pilot[axis]));
         let observed: Vec<_> = observed.iter().zip(&of_pilots[0]).map(without).collect();
-        let estimates = self.estimates(self.vertices(), &observed, noise, parameters, &|_| ())?;
-        let evidence = Evidence::of_recipients(&estimates);
         let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
-        let rest = |named: &[usize], _: &[usize]| {
-            Ok(evidence.without(&named.iter().map(|&k| signs[k]).collect::<Vec<_>>()))
-        };
         let level = significance / 10f64.powf(recipients::FURTHER_TESTS_LOG10);
-        let again = recipients::name_in_rounds(&evidence, &signs, (tried, level), rest)?;
-        standings.iter_mut().zip(again).for_each(|(standing, again)| standing.take(again, significance));
+        for noise_m in MIXED_NOISES_M {
+            let noise = Prediction::of_noise(noise_m, observed.len());
+            let estimates = self.estimates(self.vertices(), &observed, &noise, parameters, &|_| ())?;
+            let evidence = Evidence::of_recipients(&estimates);
+            let rest = |named: &[usize], _: &[usize]| {
+                Ok(evidence.without(&named.iter().map(|&k| signs[k]).collect::<Vec<_>>()))
+            };
+            let again = recipients::name_in_rounds(&evidence, &signs, (tried, level), rest)?;
+            standings.iter_mut().zip(again).for_each(|(standing, again)| standing.take(again, significance));
+        }
         Ok(())
     }
 
@@ -157,29 +157,25 @@ impl Matched<'_> {
         chosen.truncate((MOST_BETS / self.reference.patches.as_slice().len()).max(1));
         chosen
     }
+}
 
-    /// Forgets the vertices that lie where the copies of some recipients have them; the copies are
-    /// displaced by `others_m` besides their marks, metres.
-    fn forget(
-        &self,
-        observed: &mut [Option<[f64; 2]>],
-        others_m: &[[f64; 2]],
-        recipients: &[Fingerprint],
-        parameters: &Parameters,
-    ) -> Result<()> {
-        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        let found = observed.iter().flatten().count() as f64;
-        for copy_m in displacements_m(patches, recipients, coefficients, parameters)? {
-            let is_own = |vertex: &usize| {
-                let other_m = others_m[*vertex];
-                let gap = |o: [f64; 2]| [0, 1].map(|axis| o[axis] - other_m[axis] - copy_m[*vertex][axis]);
-                observed[*vertex].map(gap).is_some_and(|[x, y]| x.hypot(y) <= SAME_M)
-            };
-            let own: Vec<usize> = (0..observed.len()).filter(is_own).collect();
-            if own.len() as f64 > LEAST_OWN * found {
-                own.into_iter().for_each(|vertex| observed[vertex] = None);
-            }
+/// Forgets the vertices that lie where copies have them, which are displaced so far by their marks,
+/// and by `other_m` besides, metres.
+fn forget(
+    observed: &mut [Option<[f64; 2]>],
+    copies_m: &[Vec<[f64; 2]>],
+    other_m: impl Fn(usize) -> [f64; 2],
+) {
+    let found = observed.iter().flatten().count() as f64;
+    for copy_m in copies_m {
+        let is_own = |vertex: &usize| {
+            let other_m = other_m(*vertex);
+            let gap = |o: [f64; 2]| [0, 1].map(|axis| o[axis] - other_m[axis] - copy_m[*vertex][axis]);
+            observed[*vertex].map(gap).is_some_and(|[x, y]| x.hypot(y) <= SAME_M)
+        };
+        let own: Vec<usize> = (0..observed.len()).filter(is_own).collect();
+        if own.len() as f64 > LEAST_OWN * found {
+            own.into_iter().for_each(|vertex| observed[vertex] = None);
         }
-        Ok(())
     }
 }
