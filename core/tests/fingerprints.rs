@@ -7,14 +7,16 @@ use meshmark_core::{
     deformation::Prediction,
     embedding,
     estimation::Estimates,
-    fingerprint::{self, FingerprintEmbedding, PilotsAlone, check_score, embed, pilots, recipient_signs},
+    fingerprint::{
+        self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, embed, pilots, recipient_signs,
+    },
     ground::Ground,
     key::SecretKey,
     map::Map,
     map_data::{ChainKind, MapData},
     message::Message,
     modulation::{SpreadMessage, displacements_m},
-    mosaic::wealth_log10,
+    mosaic::{View, wealth_log10},
     options::{Parameters, Rigidity},
     part::PartDigest,
     patches::Patches,
@@ -217,8 +219,13 @@ fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)
         |n: usize| embed(&map, &key, &format!("member {n}"), COEFFICIENTS, &parameters).unwrap().coords;
     let copies: Vec<Vec<[f64; 2]>> = (0..members).map(copy).collect();
     let names = (0..members).map(|n| format!("member {n}")).chain((0..others).map(|n| format!("other {n}")));
-    let signs: Vec<_> = names.map(|name| recipient_signs(&key, &part, &name)).collect();
+    let names: Vec<String> = names.collect();
+    let signs: Vec<_> = names.iter().map(|name| recipient_signs(&key, &part, name)).collect();
+    let marks: Vec<_> = names.iter().map(|name| Fingerprint::new(&key, &part, name)).collect();
     let patches = Patches::new(&map, &parameters).unwrap();
+    let copies_m = displacements_m(&patches, &marks, COEFFICIENTS, &parameters).unwrap();
+    let pilots_m = displacements_m(&patches, &[PilotsAlone(pilots(&key, &part))], COEFFICIENTS, &parameters);
+    let pilots_m = pilots_m.unwrap().remove(0);
     let owner = |n: usize| n * 7919 % 101 % members;
     let least = |v: usize| [0, 1].map(|a| copies.iter().map(|copy| copy[v][a]).fold(f64::MAX, f64::min));
     let vertices = 0..town.vertices.coords().len();
@@ -229,9 +236,9 @@ fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)
     ];
     let bet = |(name, suspect): (&'static str, Vec<[f64; 2]>)| {
         let observed = displaced(&town, &suspect);
-        let pilots = pilots(&key, &part);
-        let wealth =
-            wealth_log10(&patches, &[&observed], COEFFICIENTS, &parameters, &pilots, &signs).unwrap();
+        let views = [View::new(&observed, &copies_m, &pilots_m)];
+        let how = (COEFFICIENTS, &parameters);
+        let wealth = wealth_log10(&patches, &views, how, &pilots(&key, &part), (&signs, &copies_m)).unwrap();
         (name, wealth[..members].to_vec(), wealth[members..].to_vec())
     };
     mixtures.into_iter().map(bet).collect()
@@ -240,7 +247,7 @@ fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)
 #[test]
 fn every_member_of_a_mosaic_wins_and_the_others_win_no_more_often_than_they_may() {
     for (mixture, members, others) in bets(8, 150) {
-        assert!(members.iter().all(|wealth| *wealth > 12.0), "{mixture}: {members:?}");
+        assert!(members.iter().all(|wealth| *wealth > 60.0), "{mixture}: {members:?}");
         // A wealth of w comes with a probability of at most 1 / w; the bounds have p < 10⁻⁶.
         let above = |wealth: f64| others.iter().filter(|other| **other >= wealth).count();
         assert!(above(0.5) <= 80 && above(1.0) <= 40 && above(4.0) == 0, "{mixture}: {others:?}");

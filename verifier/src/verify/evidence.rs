@@ -129,8 +129,8 @@ fn of_fingerprints(
     let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
     let grounds = Grounds::new(&evidence, of_pilots, power, (tried, significance));
     let mut standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
-    if grounds.ask_for_bets(&standings) {
-        matched.bet_on_shares(
+    if grounds.ask_for_shares(&standings) {
+        matched.look_for_shares(
             &seen,
             &fingerprints,
             &pilots,
