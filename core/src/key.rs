@@ -145,6 +145,12 @@ impl SecretKey {
         hex::encode(&self.derive_for(MarkVersion::Two, "key commitment", b""))
     }
 
+    /// Returns 256 bits of a keyed hash of a recipient, in hexadecimal: whoever has the key finds the
+    /// recipient in a list of them, and nobody else learns a name from it.
+    pub fn blinded(&self, recipient: &str) -> String {
+        hex::encode(&self.derive_for(MarkVersion::Two, "blinded recipient", recipient.as_bytes()))
+    }
+
     /// Returns the seed of the signs that all copies of a part have in common.
     pub(crate) fn pilot_seed(&self, part: &PartDigest) -> [u8; 32] {
         self.derive_for(MarkVersion::Two, "pilots", part.as_bytes())
@@ -254,5 +260,14 @@ mod tests {
         assert_eq!(a.commitment().len(), 64);
         assert_ne!(a.commitment(), b.commitment());
         assert!(!a.commitment().starts_with(&a.id()));
+    }
+
+    #[test]
+    fn a_blinded_recipient_depends_on_key_and_name_and_on_no_other_use_of_them() {
+        let [a, b] = [1, 2].map(|byte| SecretKey::from_bytes([byte; 32]));
+        assert_eq!(a.blinded("ACME"), a.blinded("ACME"));
+        assert_ne!(a.blinded("ACME"), a.blinded("ACME "));
+        assert_ne!(a.blinded("ACME"), b.blinded("ACME"));
+        assert_ne!(a.blinded(""), a.commitment());
     }
 }

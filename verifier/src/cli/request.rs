@@ -9,7 +9,10 @@ use meshmark_core::{
 use meshmark_detection::{Demodulator, matching::RadiusChoice};
 use meshmark_verifier::{
     Error, Request, Result,
-    inputs::{private_copy::PrivateCopy, texts},
+    inputs::{
+        private_copy::PrivateCopy,
+        texts::{self, ReadRecord},
+    },
     verify::{Sought, check_key},
 };
 
@@ -20,7 +23,7 @@ pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<R
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let possible = match &record {
-        Some(record) => {
+        Some(ReadRecord { record, .. }) => {
             Options::parse(flags)?;
             check_flags(&args.marking.0, record)?;
             check_key(record, &key)?;

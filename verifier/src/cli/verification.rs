@@ -2,13 +2,14 @@
 
 use super::{
     arguments::VerifyArgs,
-    command_line,
+    command_line, deposit,
     printing::{WARNING, print, warn, warn_of_displacements},
     request::requests,
 };
 use meshmark_verifier::{
     Error, ExitCode, Result,
     confinement::{self, End, Handover, Limits},
+    deposit::Expected,
     html,
     inputs::{digests::Digests, gdal_failures, private_copy::PrivateCopy, versions::versions},
     outputs::{EvidenceMapFile, Format, ReportFile, write_evidence_map},
@@ -108,11 +109,16 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
     let requests = requests(&args, &suspect)?;
+    let files = args.deposit.as_deref().map(|path| deposit::files(path, &args.trust, None));
+    let expected = files.map(|files| Expected::read(&files, &references)).transpose()?;
     let mut progress = Progress::of_child();
     let mut report = match &records {
         Some(folder) => verify_records(&requests[0], &references, folder, &mut progress, &mut warn)?,
         None => verify(&requests, &references, &mut progress)?,
     };
+    if let Some(expected) = expected {
+        report.deposit = Some(expected.compare(&requests[0], args.record.as_deref(), &report)?);
+    }
     if let Some(map) = report.evidence_map.take() {
         write_evidence_map(&map, &Handover(folder).evidence_map())?;
     }

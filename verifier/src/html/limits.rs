@@ -11,7 +11,7 @@ use meshmark_detection::{
 
 pub fn limits(report: &Report) -> Markup {
     html! {
-        (section("What was not tested", &list(&explain::NOT_TESTED.map(String::from))))
+        (section("What was not tested", &list(&explain::not_tested(report))))
         (section("What would weaken this finding", &list(&weaknesses(report))))
         @if let Some(provenance) = &report.provenance {
             @let deposit = explain::deposit(&provenance.inputs, report);

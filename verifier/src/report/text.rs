@@ -40,6 +40,7 @@ impl Report {
             v.suspect,
             self.read_from()
         ));
+        lines.extend(self.deposit.iter().flat_map(|deposit| deposit.to_lines()));
         lines.extend(self.left_out.to_text().map(|faults| format!("left out:     {faults}")));
         lines.push(format!("registration: {}", self.registration.to_text()));
         lines.join("\n") + "\n"
