@@ -35,6 +35,11 @@ pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     }
 }
 
+/// Returns whether a passphrase protects a text, which then is in the format of `age`, armoured.
+pub fn is_protected(text: &str) -> bool {
+    text.trim_start().starts_with("-----BEGIN AGE ENCRYPTED FILE-----")
+}
+
 /// The versions of the mark, whose secrets are independent of each other.
 #[derive(Clone, Copy)]
 enum MarkVersion {
@@ -87,6 +92,9 @@ impl SecretKey {
     /// [`Error::Key`] when it is not a key file of this version or its id is not that of its
     /// secret. The message never holds the secret.
     pub fn from_json(text: &str) -> Result<Self> {
+        if is_protected(text) {
+            return Err(Error::Key(KeyFault::Protected));
+        }
         // The messages of serde may quote values of the file, so they are not shown.
         let file: KeyFile = serde_json::from_str(text).map_err(|_| Error::Key(KeyFault::Json))?;
         if file.meshmark_key != VERSION {
@@ -233,6 +241,14 @@ mod tests {
             let error = SecretKey::from_json(&bad).unwrap_err().to_string();
             assert!(error.contains("malformed key") && !error.contains("abab"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_protected_key_is_refused_with_the_way_to_open_it() {
+        let text = "-----BEGIN AGE ENCRYPTED FILE-----\nYWdl\n-----END AGE ENCRYPTED FILE-----\n";
+        let error = SecretKey::from_json(text).unwrap_err().to_string();
+        assert!(error.contains("age -d key.json"), "{error}");
+        assert!(is_protected(text) && !is_protected(&SecretKey::from_bytes([1; 32]).to_json()));
     }
 
     #[test]

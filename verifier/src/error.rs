@@ -33,6 +33,24 @@ pub enum Error {
     Malformed { path: PathBuf, source: meshmark_core::Error },
     #[error("the {what} {} cannot be read: {source}", path.display())]
     TextUnread { what: &'static str, path: PathBuf, source: io::Error },
+    #[error("the passphrase does not open {}: give the one that it was made with", path.display())]
+    WrongPassphrase { path: PathBuf },
+    #[error("the passphrase is empty: give one, on the first line of the file if it is in one")]
+    NoPassphrase,
+    #[error("the passphrase was not the same again: start anew")]
+    OtherPassphrase,
+    #[error(
+        "there is no terminal to ask for the passphrase ({source}): give it in a file, by --passphrase-file"
+    )]
+    NoTerminal { source: io::Error },
+    #[error("the key cannot be protected by a passphrase ({reason}): protect it with age, as age -p -a does")]
+    Unprotected { reason: String },
+    #[error(
+        "the case file {} is not understood ({reason}): write TOML with the texts number, examiner and date, and a list of \
+         texts, custody",
+        path.display()
+    )]
+    CaseFile { path: PathBuf, reason: String },
     #[error("the record {}: {source}", path.display())]
     OfRecord { path: PathBuf, source: Box<Error> },
     #[error("{} is no signing key: give the file that `meshmark keygen` wrote, which ends in .signing.pem", path.display())]

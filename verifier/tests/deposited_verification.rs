@@ -69,9 +69,19 @@ fn what_was_deposited_is_fixed_since_the_time_of_the_stamp() {
 #[test]
 fn the_report_says_what_is_fixed_in_every_format() {
     let case = Case::new();
+    let text = "number = \"7/26 </style>\"\ncustody = [\"from A\", \"to B\"]\n";
+    fs::write(case.vendor.path("case.toml"), text).unwrap();
     let report = |name: &str| {
         assert_answer(
-            case.verify(&["--record", "records/acme.json", "--explain", "--report", name]),
+            case.verify(&[
+                "--record",
+                "records/acme.json",
+                "--explain",
+                "--report",
+                name,
+                "--case",
+                "case.toml",
+            ]),
             0,
             &[
                 "rules that out for what it holds, since 20",
@@ -86,8 +96,15 @@ fn the_report_says_what_is_fixed_in_every_format() {
     assert!(validator.is_valid(&json));
     assert_eq!(json["deposit"]["authority"], "CN=Authority");
     assert_eq!(json["deposit"]["public_key_given"], true);
+    assert_eq!(json["case"]["number"], "7/26 </style>");
     let page = report("report.html");
     assert!(page.contains("rules that out for what it holds, since 20"));
+    assert!(
+        page.contains("<li>to B</li>") && page.contains("Case 7\\00002f26 \\00003c\\00002fstyle"),
+        "{page}"
+    );
+    assert_eq!(page.matches("</style").count(), 1);
+    assert_eq!(page.matches("class=\"blank\"").count(), 2, "examiner and date are left to write in");
     assert!(page.contains("When the mark was made.") && !page.contains("older than the suspect"));
 }
 

@@ -5,7 +5,7 @@ use clap::{
 };
 use meshmark_core::options::{OPTIONS, OptionSpec, Spelling};
 use meshmark_detection::{Demodulator, registration::Start};
-use meshmark_verifier::ExitCode;
+use meshmark_verifier::{ExitCode, inputs::passphrase::Passphrase};
 use std::path::PathBuf;
 
 const MARKING: &str = "Maps are marked by GDAL's ogr2ogr: ogr2ogr -f GPKG marked.gpkg MESHMARK:map.gpkg \
@@ -79,6 +79,28 @@ pub(super) struct KeygenArgs {
     /// Make only the key pair, for a key file that exists
     #[arg(long)]
     pub(super) signing_key_only: bool,
+    /// Protect the secret key and the signing key by a passphrase, in the format of age; it is asked for
+    /// unless --passphrase-file has it
+    #[arg(long)]
+    pub(super) passphrase: bool,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
+}
+
+/// How protected keys are opened.
+#[derive(Args)]
+pub(super) struct OpeningFlags {
+    /// File whose first line is the passphrase of the key; without it, the terminal asks for one that is
+    /// needed
+    #[arg(long, value_name = "FILE")]
+    pub(super) passphrase_file: Option<PathBuf>,
+}
+
+impl OpeningFlags {
+    /// Returns the passphrase, which is asked for when a protected key is read.
+    pub(super) fn passphrase(&self) -> Passphrase {
+        Passphrase::new(self.passphrase_file.as_deref())
+    }
 }
 
 #[derive(Args)]
@@ -86,6 +108,8 @@ pub(super) struct DepositArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE", required_unless_present = READ_DEPOSIT)]
     pub(super) key: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
     /// The map as it was before marking, a local file; repeatable
     #[arg(long, value_name = "MAP", required_unless_present = READ_DEPOSIT)]
     pub(super) reference: Vec<PathBuf>,
@@ -131,6 +155,8 @@ pub(super) struct DistributeArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
     pub(super) key: PathBuf,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
     /// List of the recipients, CSV
     #[arg(long, value_name = "FILE")]
     pub(super) recipients: PathBuf,
@@ -219,6 +245,8 @@ pub(super) struct VerifyArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
     pub(super) key: PathBuf,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
     /// The map as it was before marking; several, such as editions, where records choose among them
     #[arg(long, value_name = "MAP", required = true)]
     pub(super) reference: Vec<PathBuf>,
@@ -264,6 +292,9 @@ pub(super) struct VerifyArgs {
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Case file for the report, TOML: number, examiner, date, custody (a list)
+    #[arg(long, value_name = "FILE", requires = "report")]
+    pub(super) case: Option<PathBuf>,
     /// Include exact displacements of vertices in the report and the evidence map, which then must be
     /// kept as secret as the records
     #[arg(long, requires = "files")]

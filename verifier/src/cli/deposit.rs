@@ -29,9 +29,10 @@ fn make(args: &DepositArgs) -> Result<()> {
     let file = NewFile::new("deposit", output)?;
     let request_path = args.time_stamp_request.as_deref();
     let request_file = request_path.map(|path| NewFile::new("time-stamp request", path)).transpose()?;
-    let key = texts::key(key_path, &mut warn)?;
+    let passphrase = args.opening.passphrase();
+    let key = texts::key(key_path, &passphrase, &mut warn)?;
     let signing_path = args.signing_key.clone().unwrap_or_else(|| signing_key_file(key_path));
-    let signing = SigningKey::read(&signing_path, &mut warn)?;
+    let signing = SigningKey::read(&signing_path, &passphrase, &mut warn)?;
     let deposited = Deposited {
         key: &key,
         references: &args.reference,
@@ -63,7 +64,8 @@ fn sending(request: &Path) -> String {
 
 fn verify(args: &DepositArgs, path: &Path) -> Result<()> {
     let opened = Opened::read(&files(path, &args.trust, args.time_stamp_request.as_deref()))?;
-    let key = args.key.as_deref().map(|path| texts::key(path, &mut warn)).transpose()?;
+    let passphrase = args.opening.passphrase();
+    let key = args.key.as_deref().map(|path| texts::key(path, &passphrase, &mut warn)).transpose()?;
     let records = args.records.as_deref();
     let standing = deposit::check(&opened.deposit, key.as_ref(), &args.reference, records, &mut warn)?;
     print(&answer(&opened, &standing))

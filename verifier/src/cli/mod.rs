@@ -83,7 +83,7 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let request = distribute::DistributeRequest {
         options: Options::parse_for_recipients(flags)?,
-        key: texts::key(&args.key, &mut warn)?,
+        key: texts::key(&args.key, &args.opening.passphrase(), &mut warn)?,
         map: args.map,
         recipients: args.recipients,
         folder: args.output_dir,

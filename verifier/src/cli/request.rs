@@ -10,6 +10,7 @@ use meshmark_detection::{Demodulator, matching::RadiusChoice};
 use meshmark_verifier::{
     Error, Request, Result,
     inputs::{
+        passphrase::Passphrase,
         private_copy::PrivateCopy,
         texts::{self, ReadRecord},
     },
@@ -19,7 +20,8 @@ use meshmark_verifier::{
 /// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
 /// either.
 pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<Request>> {
-    let key = texts::key(&args.key, &mut warn)?;
+    let passphrase = Passphrase::of_child(args.opening.passphrase_file.as_deref());
+    let key = texts::key(&args.key, &passphrase, &mut warn)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let possible = match &record {

@@ -1,7 +1,10 @@
 //! The key pair that signs deposits, Ed25519, as PEM files that other programs read, too. It is not
 //! derived from the secret of the marks: an auditor holds that secret and must not be able to sign.
 
-use crate::{Error, Result, inputs::texts};
+use crate::{
+    Error, Result,
+    inputs::{passphrase::Passphrase, texts},
+};
 use ed25519_dalek::{
     Signature, Signer,
     pkcs8::{
@@ -55,8 +58,8 @@ impl SigningKey {
     ///
     /// # Errors
     /// Fails on a file that is unreadable or no signing key.
-    pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Self> {
-        let text = texts::secret("signing key", path, warn)?;
+    pub fn read(path: &Path, passphrase: &Passphrase, warn: &mut dyn FnMut(&str)) -> Result<Self> {
+        let text = texts::secret("signing key", path, passphrase, warn)?;
         match ed25519_dalek::SigningKey::from_pkcs8_pem(&text) {
             Ok(key) => Ok(SigningKey(key)),
             Err(_) => Err(Error::NoSigningKey { path: path.into() }),
@@ -141,13 +144,14 @@ mod tests {
         fs::write(&secret, key.to_pem().as_bytes()).unwrap();
         fs::write(&public, key.public().to_pem()).unwrap();
         let mut warnings = Vec::new();
-        let read = SigningKey::read(&secret, &mut |text| warnings.push(text.to_string())).unwrap();
+        let none = Passphrase::new(None);
+        let read = SigningKey::read(&secret, &none, &mut |text| warnings.push(text.to_string())).unwrap();
         let read_public = PublicKey::read(&public).unwrap();
         assert_eq!((read.public(), warnings.len()), (read_public.clone(), 1));
         assert_eq!(PublicKey::from_hex(&read_public.to_hex()), Some(read_public.clone()));
         let signature = read.sign(b"text");
         assert!(read_public.has_signed(b"text", &signature) && !read_public.has_signed(b"texT", &signature));
         assert!(!SigningKey::random().unwrap().public().has_signed(b"text", &signature));
-        assert!(PublicKey::read(&secret).is_err() && SigningKey::read(&public, &mut |_| ()).is_err());
+        assert!(PublicKey::read(&secret).is_err() && SigningKey::read(&public, &none, &mut |_| ()).is_err());
     }
 }

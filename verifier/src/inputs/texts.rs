@@ -1,5 +1,6 @@
 //! Files of keys, records and deposits.
 
+use super::passphrase::Passphrase;
 use crate::{Error, Result};
 use meshmark_core::{
     hex,
@@ -20,18 +21,24 @@ use zeroize::Zeroizing;
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Reads a key file; `warn` receives a warning if others can read it too.
-pub fn key(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<SecretKey> {
+pub fn key(path: &Path, passphrase: &Passphrase, warn: &mut dyn FnMut(&str)) -> Result<SecretKey> {
     let (text, exposed) = secret_and_exposure("key", path)?;
+    let text = passphrase.open(path, text)?;
     let key = SecretKey::from_json(&text).map_err(|source| Error::Malformed { path: path.into(), source })?;
     exposed.iter().for_each(|text| warn(text));
     Ok(key)
 }
 
 /// Reads the text of a file that holds a secret; `warn` receives a warning if others can read it too.
-pub fn secret(what: &'static str, path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Zeroizing<String>> {
+pub fn secret(
+    what: &'static str,
+    path: &Path,
+    passphrase: &Passphrase,
+    warn: &mut dyn FnMut(&str),
+) -> Result<Zeroizing<String>> {
     let (text, exposed) = secret_and_exposure(what, path)?;
     exposed.iter().for_each(|text| warn(text));
-    Ok(text)
+    passphrase.open(path, text)
 }
 
 fn secret_and_exposure(what: &'static str, path: &Path) -> Result<(Zeroizing<String>, Option<String>)> {

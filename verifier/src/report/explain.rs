@@ -61,11 +61,20 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
         None => "There was no record: how the map was marked was taken from the command line.".into(),
     });
     sentences.push(format!("File of the suspect: {}. {UNTOUCHED}", inputs.suspect.digest));
+    sentences.extend(same_file(inputs));
     sentences
 }
 
 /// `Digests::of_verification` fails otherwise.
 pub(crate) const UNTOUCHED: &str = "It was examined as a private copy, and had the same digest afterwards.";
+
+/// Returns a notice where suspect and reference are the same.
+pub(crate) fn same_file(inputs: &Inputs) -> Option<String> {
+    (inputs.suspect.digest == inputs.reference.digest).then(|| {
+        "Suspect and reference have the same digest: the suspect is the unmarked map itself, or was given by mistake."
+            .into()
+    })
+}
 
 /// Returns sentences about the deposit of key and reference.
 pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
@@ -104,8 +113,21 @@ pub(crate) fn not_tested(report: &Report) -> Vec<String> {
         Some(DepositEntry { since: Some(_), .. }) => "When the mark was made.",
         _ => "When the mark was made, and whether key and record are older than the suspect.",
     };
+    let others = match (&report.candidates, &report.parameters.mark) {
+        (None, _) => {
+            "Other recipients, and mixtures of their copies: one copy was tried, where --records tries all."
+        }
+        (_, MarkParameters::Message(_)) => {
+            "Mixtures of more copies than an average of a few, and copies of which there is no record."
+        }
+        (_, MarkParameters::Fingerprint(_)) => {
+            "Copies of which there is no record, and mixtures of so many copies that none of them shows by itself."
+        }
+    };
     [
         "Who passed the map on: the mark identifies the copy it was made from.",
+        others,
+        "Whether somebody else had the key, who could mark copies as well.",
         "Attributes, styles and which features are there: the mark is in the coordinates alone.",
         time,
         "Other keys and other references: the p-values hold for one key and one reference fixed beforehand.",
@@ -139,7 +161,11 @@ fn found(report: &Report) -> Vec<String> {
         return sentences;
     };
     let errors = report.bit_errors.map_or(String::new(), |errors| {
-        format!(", which differs from the expected message in {errors} of {} bits", report.bits.len())
+        format!(
+            ", which differs from the expected message in {errors} of {} bits{}",
+            report.bits.len(),
+            report.bits_by_chance()
+        )
     });
     let other = report.other_reading();
     sentences.push(format!("The suspect was read as the message {message}{other}{errors}."));
