@@ -29,8 +29,9 @@ build: deps
 	mkdir -p $(PLUGINS)
 	install -m 755 $(BUILD)/libmeshmark_plugin.so $(PLUGIN)
 
-# They compile neither plots nor benchmarks.
+# They compile neither plots nor benchmarks. openssl is the time-stamping authority.
 test: build
+	@./install-deps.sh openssl
 	$(WITH_GDAL) $(CARGO) test --release --locked
 
 # What the studies make of their own figures.

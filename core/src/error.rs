@@ -57,6 +57,7 @@ impl std::error::Error for Error {
 #[allow(missing_docs)] // the messages are the documentation
 pub enum KeyFault {
     Json,
+    Protected,
     Version { found: u32, expected: u32 },
     Secret,
     Id,
@@ -68,6 +69,9 @@ impl fmt::Display for KeyFault {
             KeyFault::Json => {
                 f.write_str("it is not JSON with exactly the fields meshmark_key, id and secret")
             }
+            KeyFault::Protected => f.write_str(
+                "a passphrase protects it, which cannot be given here: open it in a pipe, in bash KEY=<(age -d key.json)",
+            ),
             KeyFault::Version { found, expected } => write!(f, "version {found} instead of {expected}"),
             KeyFault::Secret => f.write_str("the secret is not 64 hexadecimal digits"),
             KeyFault::Id => f.write_str("the id is not that of the secret, so one of them was changed"),

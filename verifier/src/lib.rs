@@ -8,6 +8,7 @@
 
 pub mod compare;
 pub mod confinement;
+pub mod deposit;
 pub mod distribute;
 mod error;
 mod exit_code;
@@ -17,6 +18,7 @@ pub mod outputs;
 pub mod progress;
 pub mod report;
 mod thinning;
+pub mod time_stamp;
 pub mod verify;
 pub mod words;
 

@@ -122,6 +122,31 @@ fn the_record_that_the_driver_wrote_is_valid() {
 }
 
 #[test]
+fn the_statement_of_a_deposit_is_valid_and_its_schema_says_what_is_read() {
+    let statement = common::deposits::Vendor::new().statement();
+    assert_valid("deposit", &statement);
+    let objects = [
+        "",
+        "/subject/0",
+        "/subject/0/digest",
+        "/predicate",
+        "/predicate/references/0",
+        "/predicate/marks/0",
+        "/predicate/records",
+        "/predicate/recipients",
+    ];
+    assert_closed("deposit", &statement, &objects);
+    let changes = [
+        ("/predicateType", json!("urn:meshmark:deposit:2")),
+        ("/subject", json!([])),
+        ("/predicate/key_commitment", json!("434471506306423b")),
+        ("/predicate/references/0/vertices", json!(0)),
+        ("/predicate/records/merkle_root", json!("F".repeat(64))),
+    ];
+    assert_refused("deposit", &statement, &changes);
+}
+
+#[test]
 fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
     let text = fs::read_to_string(root().join("fixtures/vectors/fingerprint/record.json")).unwrap();
     let record: Value = serde_json::from_str(&text).unwrap();

@@ -2,6 +2,8 @@
 
 mod arguments;
 mod command_line;
+mod deposit;
+mod keygen;
 mod printing;
 mod request;
 mod verification;
@@ -9,7 +11,7 @@ mod verification;
 use crate::package_files;
 use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands};
 use clap::{CommandFactory, Parser};
-use meshmark_core::{counted, key::SecretKey, options::Options};
+use meshmark_core::{counted, options::Options};
 use meshmark_verifier::{
     Error, Result,
     compare::{Comparison, Details, compare, detail::ComparedFiles},
@@ -19,10 +21,7 @@ use meshmark_verifier::{
     progress::Progress,
 };
 use printing::{print, warn, warn_of_displacements};
-use std::{
-    io::{ErrorKind, Write},
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 /// The exit code of a command that succeeds; a match has the same code.
 const DONE: u8 = 0;
@@ -31,7 +30,8 @@ const DONE: u8 = 0;
 pub fn run() -> u8 {
     gdal_failures::quieten_gdal();
     let result = match Cli::parse().command {
-        Subcommands::Keygen { key_file } => keygen(&key_file).map(|()| DONE),
+        Subcommands::Keygen(args) => keygen::run(&args).map(|()| DONE),
+        Subcommands::Deposit(args) => deposit::run(&args).map(|()| DONE),
         Subcommands::Verify(args) => verification::run(&args),
         Subcommands::Examine { folder, args } => verification::examine(*args, &folder).map(|code| code as u8),
         Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
@@ -42,29 +42,6 @@ pub fn run() -> u8 {
         warn(&error.to_string());
         error.exit_code() as u8
     })
-}
-
-fn keygen(path: &PathBuf) -> Result<()> {
-    let key = SecretKey::filled(getrandom::fill).map_err(|source| Error::Random { source })?;
-    let failed = |error: std::io::Error| match error.kind() {
-        ErrorKind::AlreadyExists => Error::Exists {
-            path: path.clone(),
-            remedy: ", and a key is never overwritten: name another file",
-        },
-        _ => Error::unwritten(format!("the key file {}", path.display()), error),
-    };
-    let mut options = std::fs::OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let mut file = options.open(path).map_err(failed)?;
-    let written = file.write_all(key.to_json().as_bytes()).and_then(|()| file.sync_all());
-    if let Err(error) = written {
-        let _ = std::fs::remove_file(path); // an incomplete key is worse than none
-        return Err(failed(error));
-    }
-    print(&format!("key {} written to {}\n", key.id(), path.display()))?;
-    Ok(())
 }
 
 fn write_package_files(folder: &Path) -> Result<()> {
@@ -106,7 +83,7 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let request = distribute::DistributeRequest {
         options: Options::parse_for_recipients(flags)?,
-        key: texts::key(&args.key, &mut warn)?,
+        key: texts::key(&args.key, &args.opening.passphrase(), &mut warn)?,
         map: args.map,
         recipients: args.recipients,
         folder: args.output_dir,

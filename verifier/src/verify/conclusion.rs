@@ -188,6 +188,8 @@ fn report(
         null_hypothesis: None,
         p_any_message_log10: None,
         candidates: None,
+        case: None,
+        deposit: None,
         decoys: None,
         registration: seen.registration.clone(),
         vertices: seen.vertices,

@@ -19,7 +19,7 @@ mod records;
 mod references;
 mod request;
 
-pub use belonging::{check_key, check_reference};
+pub use belonging::{check_key, check_reference, is_made_from};
 pub use evidence::{FingerprintEvidence, Found, MessageEvidence};
 pub use examination::{Examination, Suited, examine, read_reference};
 pub use records::verify_records;

@@ -23,16 +23,16 @@ pub fn read_own_reference(
     if let [path] = references {
         let request = Request { reference: path.clone(), ..request.clone() };
         let reference = read_reference(&request, progress)?.or_fail()?;
-        if let Some(record) = &request.record {
-            check_reference(record, &request, &reference, &reference.data.vertices.digest())?;
+        if let Some(read) = &request.record {
+            check_reference(&read.record, &request, &reference, &reference.data.vertices.digest())?;
         }
         return Ok((request, reference));
     }
-    let Some(record) = &request.record else { return Err(Error::SeveralReferences) };
+    let Some(read) = &request.record else { return Err(Error::SeveralReferences) };
     for path in references {
         let request = Request { reference: path.clone(), ..request.clone() };
         if let Suited::Yes(reference) = read_reference(&request, progress)?
-            && is_made_from(record, &reference.data.vertices.digest())
+            && is_made_from(&read.record, &reference.data.vertices.digest())
         {
             return Ok((request, reference));
         }

@@ -1,10 +1,9 @@
 //! The request of a verification.
 
-use crate::inputs::private_copy::PrivateCopy;
+use crate::inputs::{private_copy::PrivateCopy, texts::ReadRecord};
 use meshmark_core::{
     key::SecretKey,
     options::{Parameters, Subject},
-    recorded::Recorded,
 };
 use meshmark_dataset::LabelFields;
 use meshmark_detection::{
@@ -54,7 +53,7 @@ pub struct Request {
     /// The suspect map.
     pub suspect: PrivateCopy,
     /// The record that the driver wrote when it marked the map.
-    pub record: Option<Recorded>,
+    pub record: Option<ReadRecord>,
     /// The expected subject of the mark, if it is known.
     pub subject: Option<Subject>,
     /// What the mark carries.
