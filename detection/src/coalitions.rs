@@ -54,17 +54,17 @@ impl Matched<'_> {
         (tried, significance): (usize, f64),
     ) -> Result<Vec<Standing>> {
         let evidence = Evidence::of_recipients(&seen.estimates);
-        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own.clone()).collect();
         let mut observed = seen.observed.clone();
         let shows_vertices =
             seen.disturbance.deformation.noise_m <= MOST_NOISE_M && !seen.observations.is_of_features();
         recipients::name_in_rounds(&evidence, &signs, (tried, significance), |named, new| {
-            let named: Vec<Sequence> = named.iter().map(|&k| signs[k]).collect();
+            let named: Vec<Sequence> = named.iter().map(|&k| signs[k].clone()).collect();
             let rest = evidence.without(&named);
             if !shows_vertices || rest.energy() < LEAST_REST * evidence.energy() {
                 return Ok(rest);
             }
-            let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k]).collect();
+            let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k].clone()).collect();
             let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
             let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
             forget(&mut observed, &copies_m, |vertex| seen.disturbance.displacement_m[vertex]);
@@ -102,11 +102,11 @@ impl Matched<'_> {
         let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
         for round in 1..=MOST_ROUNDS {
             let chosen = self.chosen(standings);
-            let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own).collect();
+            let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own.clone()).collect();
             let of_views = views.each_ref().map(Vec::as_slice);
             let wealth = mosaic::wealth_log10(patches, &of_views, coefficients, parameters, pilots, &signs)?;
             chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, round, tried));
-            let new = chosen.iter().filter(|&&k| standings[k].is_named).map(|&k| candidates[k]);
+            let new = chosen.iter().filter(|&&k| standings[k].is_named).map(|&k| candidates[k].clone());
             let new: Vec<Fingerprint> = new.collect();
             if new.is_empty() || round == MOST_ROUNDS || standings.iter().all(|standing| standing.is_named) {
                 break;
@@ -131,18 +131,18 @@ impl Matched<'_> {
         standings: &mut [Standing],
     ) -> Result<()> {
         let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        let of_pilots = displacements_m(patches, &[PilotsAlone(*pilots)], coefficients, parameters)?;
+        let of_pilots = displacements_m(patches, &[PilotsAlone(pilots.clone())], coefficients, parameters)?;
         let without =
             |(o, pilot): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [0, 1].map(|axis| o[axis] - pilot[axis]));
         let observed: Vec<_> = observed.iter().zip(&of_pilots[0]).map(without).collect();
-        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own.clone()).collect();
         let level = significance / 10f64.powf(recipients::FURTHER_TESTS_LOG10);
         for noise_m in MIXED_NOISES_M {
             let noise = Prediction::of_noise(noise_m, observed.len());
             let estimates = self.estimates(self.vertices(), &observed, &noise, parameters, &|_| ())?;
             let evidence = Evidence::of_recipients(&estimates);
             let rest = |named: &[usize], _: &[usize]| {
-                Ok(evidence.without(&named.iter().map(|&k| signs[k]).collect::<Vec<_>>()))
+                Ok(evidence.without(&named.iter().map(|&k| signs[k].clone()).collect::<Vec<_>>()))
             };
             let again = recipients::name_in_rounds(&evidence, &signs, (tried, level), rest)?;
             standings.iter_mut().zip(again).for_each(|(standing, again)| standing.take(again, significance));

@@ -10,7 +10,7 @@ use meshmark_detection::{Demodulator, matching::RadiusChoice};
 use meshmark_verifier::{
     Error, Request, Result,
     inputs::{private_copy::PrivateCopy, texts},
-    verify::{Sought, check_key},
+    verify::{Sought, check_key, lineage_of},
 };
 
 /// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
@@ -32,6 +32,7 @@ pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<R
     let request = |options: Options| {
         Ok(Request {
             sought: sought(&options, &key, args.demodulator.into(), tried)?,
+            lineage: record.as_ref().map(lineage_of).unwrap_or_default(),
             tried,
             subject: options.subject,
             key: key.clone(),
