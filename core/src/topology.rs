@@ -182,16 +182,35 @@ impl<'a> Movement<'a> {
         let (of_mean, of_rest) = LEVELS[cluster.level];
         let wanted: Vec<Motion> = cluster.members.iter().map(|&mover| self.wanted_of(mover)).collect();
         let mean = mean(wanted.iter().map(|motion| motion.shift_m));
-        let met = cluster.met.iter();
-        let rest = met.map(|&v| [0, 1].map(|a| self.wanted[v as usize][a] * self.scale(v)[a]));
-        let rest = self::mean(rest);
         for (&mover, motion) in cluster.members.iter().zip(wanted) {
+            let rest = self.standing_near(mover, &cluster.met);
             let shift = |axis: usize| {
                 let of_all = rest[axis] + of_mean * (mean[axis] - rest[axis]);
                 of_all + of_rest * (motion.shift_m[axis] - mean[axis])
             };
             self.move_by(mover, Motion { shift_m: [0, 1].map(shift), turn: of_rest * motion.turn });
         }
+    }
+
+    /// Returns the movement of standing vertices at the place of a mover, metres: their mean, each
+    /// weighted by the inverse of its distance, which on a segment is that of the nearest place.
+    fn standing_near(&self, mover: u32, standing: &BTreeSet<u32>) -> [f64; 2] {
+        let own = [mover];
+        let members = self.body(mover).map_or(&own[..], |body| &body.members);
+        let weight = |v: u32| {
+            let distance = |&member: &u32| {
+                let [dx, dy] = self.map.ground.metres_between(self.map.at(member), self.map.at(v));
+                dx.hypot(dy)
+            };
+            1.0 / members.iter().map(distance).fold(f64::INFINITY, f64::min).max(JUNCTION_M)
+        };
+        let (mut sum, mut weights) = ([0.0; 2], 0.0);
+        for &v in standing {
+            let (weight, scale) = (weight(v), self.scale(v));
+            weights += weight;
+            sum = [0, 1].map(|a| sum[a] + weight * self.wanted[v as usize][a] * scale[a]);
+        }
+        if weights > 0.0 { sum.map(|value| value / weights) } else { sum }
     }
 
     /// Moves hanging vertices along with their anchors and places all vertices.
@@ -281,6 +300,14 @@ struct Cluster {
     level: usize,
 }
 
+impl Cluster {
+    /// Returns the least level at which a cluster comes nearer to the standing vertices that it meets:
+    /// below, vertices that move alike, or not at all, would not change, and the search would end.
+    fn least_level(&self) -> usize {
+        if self.met.is_empty() { 0 } else { RIGID + 1 }
+    }
+}
+
 impl Clusters {
     fn new(vertices: usize) -> Self {
         Clusters { sets: DisjointSets::new(vertices), clusters: BTreeMap::new() }
@@ -309,14 +336,14 @@ impl Clusters {
         let joined: BTreeSet<u32> = joined.into_iter().map(|root| self.sets.root(root)).collect();
         for &root in &joined {
             let cluster = self.clusters.get_mut(&root).expect("it was joined");
-            cluster.level = cluster.level.clamp(1, RIGID);
+            cluster.level = cluster.level.clamp(1, RIGID).max(cluster.least_level());
         }
         let mut touched = joined.clone();
         let again: BTreeSet<u32> = again.into_iter().map(|root| self.sets.root(root)).collect();
         for root in again.difference(&joined) {
             let cluster = self.clusters.get_mut(root).expect("it was joined before");
             if cluster.level < FROZEN {
-                cluster.level += 1;
+                cluster.level = (cluster.level + 1).max(cluster.least_level());
                 touched.insert(*root);
             }
         }

@@ -28,6 +28,10 @@ fn key() -> SecretKey {
     SecretKey::from_bytes([42; 32])
 }
 
+/// The version of a house that has a new neighbour this near to its wall, metres.
+const BESIDE: usize = 9;
+const GAP: f64 = 0.05;
+
 /// A house of an edition: which plot it is on, and which version of it stands there.
 type House = (usize, usize);
 
@@ -36,8 +40,8 @@ type House = (usize, usize);
 fn town(houses: &[House]) -> MapData {
     let (mut coords, mut starts, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
     for &(plot, version) in houses {
-        // Version 2 adds a bay to version 1, whose other corners stay.
-        let shape = if version == 2 { 1 } else { version };
+        // Version 2 adds a bay to version 1, whose other corners stay, and version 9 a kiosk beside it.
+        let shape = if [2, BESIDE].contains(&version) { 1 } else { version };
         let jitter = |n: usize| ((plot * 7919 + shape * 104_729 + n * 31) % 101) as f64 / 50.0;
         let (x, y) = ((plot % SIDE * 20) as f64 + jitter(3), (plot / SIDE * 20) as f64);
         let (width, depth) = (8.0 + jitter(1), 7.0 + jitter(2));
@@ -54,6 +58,12 @@ fn town(houses: &[House]) -> MapData {
         starts.push(coords.len() as u32);
         coords.extend(ring);
         kinds.push(ChainKind::Shell);
+        if version == BESIDE {
+            let kiosk = [[x + 1.0, y + depth + GAP], [x + 3.0, y + depth + 2.0], [x + 1.0, y + depth + 2.0]];
+            starts.push(coords.len() as u32);
+            coords.extend([kiosk[0], kiosk[1], kiosk[2], kiosk[0]]);
+            kinds.push(ChainKind::Shell);
+        }
         if version == 3 {
             // A shed has a corner on the wall.
             let shed = [[x + 1.0, y + depth], [x + 3.0, y + depth], [x + 3.0, y + depth + 2.0]];
@@ -193,4 +203,33 @@ fn few_new_vertices_are_no_part_and_the_copy_still_names_its_recipient() {
     let embedding = FingerprintEmbedding::new(&of_both, &key, COEFFICIENTS).unwrap();
     assert_eq!(embedding.parts().as_slice().len(), 1);
     assert!(score(&editions, &copy(&editions, "New Ltd"), "New Ltd") > 20.0);
+}
+
+/// Returns how many corners of kiosks are on the other side of the wall that they stand beside.
+fn through_walls(data: &MapData, coords: &[[f64; 2]]) -> usize {
+    let from = data.vertices.coords();
+    let beside = |v: usize, [a, b]: [usize; 2]| {
+        let is_wall = from[a][1] == from[b][1] && from[v][0] > from[a][0] && from[v][0] < from[b][0];
+        is_wall && (from[v][1] - from[a][1] - GAP).abs() < 1e-6
+    };
+    let walls = data.segments.iter().map(|segment| segment.map(|v| v as usize));
+    let walls: Vec<[usize; 2]> = walls.collect();
+    let through = |v: usize| {
+        let mut own = walls.iter().filter(|wall| beside(v, **wall));
+        own.any(|&[a, b]| orientation(coords[a], coords[b], coords[v]) <= 0.0)
+    };
+    assert!((0..from.len()).any(|v| walls.iter().any(|wall| beside(v, *wall))));
+    (0..from.len()).filter(|&v| through(v)).count()
+}
+
+#[test]
+fn what_is_new_beside_a_standing_wall_gives_way_to_it() {
+    // Few kiosks stay in place unless a wall moves them, many carry signs.
+    for count in [15, SIDE * SIDE] {
+        let before: Vec<House> = (0..SIDE * SIDE).map(|plot| (plot, 1)).collect();
+        let after: Vec<House> =
+            before.iter().map(|&(plot, _)| (plot, if plot < count { BESIDE } else { 1 })).collect();
+        let editions = [town(&before), town(&after)];
+        assert_eq!(through_walls(&editions[1], &copy(&editions, "ACME")), 0, "{count}");
+    }
 }
