@@ -30,6 +30,7 @@ pub enum Error {
     Quotes { option: &'static str, value: String },
     IllegalValue { option: &'static str, value: String, kind: Kind },
     BothSubjects,
+    BaseOfMessage,
     NoReference,
 }
 
@@ -91,6 +92,7 @@ pub enum RecordFault {
     Coefficients { found: usize, most: usize },
     Digest { text: String },
     NoPart,
+    UnknownBase { digest: String },
     NoRecipient,
 }
 
@@ -110,6 +112,9 @@ impl fmt::Display for RecordFault {
             RecordFault::Coefficients { found, most } => write!(f, "{found} coefficients, of 1 to {most}"),
             RecordFault::Digest { text } => {
                 write!(f, "\"{text}\" is no digest: it has 64 hexadecimal digits")
+            }
+            RecordFault::UnknownBase { digest } => {
+                write!(f, "a base has the base {digest}, which is not listed before it")
             }
             RecordFault::NoPart => f.write_str("it names no part of the map"),
             RecordFault::NoRecipient => f.write_str("it has no recipient"),
@@ -215,6 +220,13 @@ impl Error {
             Error::NoReference => format!(
                 "there is no {}: name a GeoPackage for the unmarked map, which nobody else will have",
                 name("REFERENCE")
+            ),
+            Error::BaseOfMessage => format!(
+                "{} is for fingerprints: give a {}, and neither {} nor {}",
+                name("BASE"),
+                name("RECIPIENT"),
+                name("CODE"),
+                name("CHIP_RATE")
             ),
             Error::BothSubjects => {
                 format!("both {} and {} are given: give exactly one", name("RECIPIENT"), name("MESSAGE"))

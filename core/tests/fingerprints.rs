@@ -5,11 +5,9 @@ use meshmark_core::{
     agreement::{Agreement, Evidence},
     carrier::Carrier,
     deformation::Prediction,
-    embedding,
+    embedding::{self, Marked},
     estimation::Estimates,
-    fingerprint::{
-        self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, embed, pilots, recipient_signs,
-    },
+    fingerprint::{self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, pilots, recipient_signs},
     ground::Ground,
     key::SecretKey,
     map::Map,
@@ -18,8 +16,9 @@ use meshmark_core::{
     modulation::{SpreadMessage, displacements_m},
     mosaic::{View, wealth_log10},
     options::{Parameters, Rigidity},
-    part::PartDigest,
+    part::Parts,
     patches::Patches,
+    series::Series,
     signs::Signs,
 };
 
@@ -44,6 +43,18 @@ fn displaced(town: &MapData, coords: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
     pairs.map(|(from, to)| Some([to[0] - from[0], to[1] - from[1]])).collect()
 }
 
+/// Marks a map of one part for a recipient.
+fn embed(
+    map: &Map,
+    key: &SecretKey,
+    recipient: &str,
+    coefficients: usize,
+    parameters: &Parameters,
+) -> Result<Marked, Error> {
+    let series = Series::of(*map, parameters);
+    fingerprint::embed(&series, key, recipient, coefficients).map(|(marked, _)| marked)
+}
+
 fn estimates(map: &Map, observed: &[Option<[f64; 2]>], parameters: &Parameters) -> Estimates {
     let patches = Patches::new(map, parameters).unwrap();
     let noise = Prediction::of_noise(0.01, observed.len());
@@ -51,7 +62,7 @@ fn estimates(map: &Map, observed: &[Option<[f64; 2]>], parameters: &Parameters) 
 }
 
 fn agreement(town: &MapData, seen: &Estimates, recipient: &str) -> Agreement {
-    let signs = recipient_signs(&key(), &PartDigest::of(&town.vertices), recipient);
+    let signs = recipient_signs(&key(), &Parts::whole(&town.vertices), recipient);
     Evidence::of_recipients(seen).agreement(&signs)
 }
 
@@ -70,7 +81,7 @@ fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_in_every_shape() 
         let (least_score, least_share) = if shape == Rigidity::Free { (42.0, 0.99) } else { (28.0, 0.75) };
         assert!(own.score > least_score, "{shape:?} {own:?}");
         assert!(own.agreeing as f64 > least_share * own.signs as f64, "{shape:?} {own:?}");
-        let part = PartDigest::of(&town.vertices);
+        let part = Parts::whole(&town.vertices);
         assert!(Evidence::of_pilots(&whole).agreement(&pilots(&key(), &part)).score > 10.0);
         observed.iter_mut().enumerate().filter(|(i, _)| i % 3 > 0).for_each(|(_, o)| *o = None);
         let third = estimates(&map, &observed, &parameters);
@@ -91,7 +102,8 @@ fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
     let town = town();
     let (map, key, parameters) =
         (town.on(&Ground::METRES, &Ground::METRES), key(), Parameters::of_fingerprint());
-    let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
+    let series = Series::of(map, &parameters);
+    let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let embedding = embedding.for_many().unwrap();
     let names = ["ACME", "Öster AB"];
     let all = names.map(|name| embedding.fingerprint(name));
@@ -185,7 +197,7 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
         signs_of_copy(&map, &town, &copy.coords, &parameters)
     });
     let public =
-        |name: &str| recipient_signs(&SecretKey::from_bytes([0; 32]), &PartDigest::of(&town.vertices), name);
+        |name: &str| recipient_signs(&SecretKey::from_bytes([0; 32]), &Parts::whole(&town.vertices), name);
     let product = |x: Vec<f64>, y: Vec<f64>| x.iter().zip(&y).map(|(x, y)| x * y).collect::<Vec<_>>();
     let as_it_is = |patch, axis, count| of_axis(&copies[0], patch, axis, count);
     let renamed = |patch, axis, count| {
@@ -214,7 +226,7 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
 fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)> {
     let town = town();
     let map = town.on(&Ground::METRES, &Ground::METRES);
-    let (key, part, parameters) = (key(), PartDigest::of(&town.vertices), Parameters::of_fingerprint());
+    let (key, part, parameters) = (key(), Parts::whole(&town.vertices), Parameters::of_fingerprint());
     let copy =
         |n: usize| embed(&map, &key, &format!("member {n}"), COEFFICIENTS, &parameters).unwrap().coords;
     let copies: Vec<Vec<[f64; 2]>> = (0..members).map(copy).collect();
@@ -261,7 +273,7 @@ fn an_average_of_many_copies_shows_its_members_once_the_pilots_are_taken_out() {
     const MEMBERS: usize = 24;
     let town = town();
     let map = town.on(&Ground::METRES, &Ground::METRES);
-    let (key, part, parameters) = (key(), PartDigest::of(&town.vertices), Parameters::of_fingerprint());
+    let (key, part, parameters) = (key(), Parts::whole(&town.vertices), Parameters::of_fingerprint());
     let name = |n: usize| format!("member {n}");
     let copies: Vec<Vec<[f64; 2]>> = (0..MEMBERS)
         .map(|n| embed(&map, &key, &name(n), COEFFICIENTS, &parameters).unwrap().coords)

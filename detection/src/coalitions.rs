@@ -52,17 +52,17 @@ impl Matched<'_> {
         (tried, significance): (usize, f64),
     ) -> Result<Vec<Standing>> {
         let evidence = Evidence::of_recipients(&seen.estimates);
-        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own.clone()).collect();
         let mut observed = seen.observed.clone();
         let shows_vertices =
             seen.disturbance.deformation.noise_m <= MOST_NOISE_M && !seen.observations.is_of_features();
         recipients::name_in_rounds(&evidence, &signs, (tried, significance), |named, new| {
-            let named: Vec<Sequence> = named.iter().map(|&k| signs[k]).collect();
+            let named: Vec<Sequence> = named.iter().map(|&k| signs[k].clone()).collect();
             let rest = evidence.without(&named);
             if !shows_vertices || rest.energy() < LEAST_REST * evidence.energy() {
                 return Ok(rest);
             }
-            let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k]).collect();
+            let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k].clone()).collect();
             let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
             let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
             forget(&mut observed, &copies_m, |vertex| seen.disturbance.displacement_m[vertex]);
@@ -97,11 +97,11 @@ impl Matched<'_> {
         let views = [suspect, &self.moved]
             .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
         let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        let pilots_m = displacements_m(patches, &[PilotsAlone(*pilots)], coefficients, parameters)?.remove(0);
+        let pilots_m = displacements_m(patches, &[PilotsAlone(pilots.clone())], coefficients, parameters)?.remove(0);
         self.score_without_pilots(&views[0], &pilots_m, candidates, parameters, tried, standings)?;
         let chosen = self.chosen(standings);
-        let of_chosen: Vec<Fingerprint> = chosen.iter().map(|&k| candidates[k]).collect();
-        let signs: Vec<Sequence> = of_chosen.iter().map(|candidate| candidate.own).collect();
+        let of_chosen: Vec<Fingerprint> = chosen.iter().map(|&k| candidates[k].clone()).collect();
+        let signs: Vec<Sequence> = of_chosen.iter().map(|candidate| candidate.own.clone()).collect();
         let copies_m = displacements_m(patches, &of_chosen, coefficients, parameters)?;
         let views = views.each_ref().map(|view| View::new(view, &copies_m, &pilots_m));
         let wealth =
@@ -126,7 +126,7 @@ impl Matched<'_> {
         let without =
             |(o, pilot): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [0, 1].map(|axis| o[axis] - pilot[axis]));
         let observed: Vec<_> = observed.iter().zip(pilots_m).map(without).collect();
-        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own.clone()).collect();
         let least_score = recipients::suspected_score(tried.0);
         for noise_m in MIXED_NOISES_M {
             let noise = Prediction::of_noise(noise_m, observed.len());

@@ -130,6 +130,12 @@ pub enum Error {
     )]
     OtherParts { parts: usize },
     #[error(
+        "the {} of the record are not those of its reference and its bases: give the files of all editions, unchanged, or \
+         verify with the version of meshmark that wrote it",
+        counted(*parts, "part")
+    )]
+    OtherPartsOfBases { parts: usize },
+    #[error(
         "the demodulator of the paper reads messages, and the mark is the fingerprint of a recipient: leave --demodulator \
          out"
     )]
@@ -327,10 +333,12 @@ impl Error {
             Dataset(MapError::File { .. } | MapError::NotKept { .. } | MapError::Gdal(_)) => {
                 ExitCode::Unwritable
             }
+            Dataset(error) if error.is_of_other_base() => ExitCode::DoesNotBelong,
             NotDeposited { .. }
             | OtherKey { .. }
             | OtherCommitment { .. }
             | OtherParts { .. }
+            | OtherPartsOfBases { .. }
             | OtherMessage
             | OtherReference { .. }
             | NoReferenceOfRecord { .. } => ExitCode::DoesNotBelong,

@@ -160,8 +160,20 @@ fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
     signed["signature"] = json!({ "ed25519": "00" });
     assert_valid("record-2", &signed);
     assert!(FingerprintRecord::from_json(&signed.to_string()).is_ok());
+    let mut record = record;
+    let first = json!({ "vertices_sha256": "ab".repeat(32), "layers": null, "srs": null, "bases": [] });
+    let mut second = first.clone();
+    second["vertices_sha256"] = json!("cd".repeat(32));
+    second["bases"] = json!(["ab".repeat(32)]);
+    second["layers"] = json!(["roads"]);
+    record["bases"] = json!([first, second]);
+    assert_valid("record-2", &record);
+    assert!(FingerprintRecord::from_json(&record.to_string()).is_ok());
+    assert_closed("record-2", &record, &["/bases/1"]);
     let changes = [
         ("/meshmark_record", json!(1)),
+        ("/bases/0/vertices_sha256", json!("00")),
+        ("/bases/1/bases", json!(["AB"])),
         ("/recipient", json!(" ")),
         ("/key_commitment", json!("434471506306423b")),
         ("/mark/amplitude_m", json!(0)),

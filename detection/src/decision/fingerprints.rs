@@ -126,7 +126,7 @@ mod tests {
         estimation::Estimates,
         fingerprint::{Fingerprint, pilots, recipient_signs},
         key::SecretKey,
-        part::PartDigest,
+        part::Parts,
         signs::{Sequence, Signs},
         vertices::VertexTable,
     };
@@ -138,8 +138,8 @@ mod tests {
         SecretKey::from_bytes([3; 32])
     }
 
-    fn part() -> PartDigest {
-        PartDigest::of(&VertexTable::new(vec![[0.0, 1.0]]).unwrap())
+    fn part() -> Parts {
+        Parts::whole(&VertexTable::new(vec![[0.0, 1.0]]).unwrap())
     }
 
     fn signs(name: &str) -> Sequence {

@@ -85,7 +85,7 @@ pub struct Standing {
 pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significance: f64) -> Vec<Standing> {
     let tried = candidates.len();
     let linear = |named: &[usize], _: &[usize]| {
-        Ok(evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>()))
+        Ok(evidence.without(&named.iter().map(|&k| candidates[k].clone()).collect::<Vec<_>>()))
     };
     name_in_rounds(evidence, candidates, (tried, significance), linear).expect("nothing fails")
 }

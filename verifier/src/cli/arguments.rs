@@ -317,6 +317,9 @@ pub(super) struct MarkingFlags(pub(super) Vec<(&'static str, String)>);
 /// The marking options as flags of `distribute`; its list holds the subjects.
 pub(super) struct DistributeFlags(pub(super) Vec<(&'static str, String)>);
 
+/// Options that shape no mark by themselves, and concern those who distribute.
+const OF_DISTRIBUTE: [&str; 3] = ["ATTRIBUTES", "BASE", "BASE_REFERENCE"];
+
 const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
 
 /// Returns a flag for every option that `is_wanted`.
@@ -363,7 +366,7 @@ impl FromArgMatches for MarkingFlags {
 impl Args for DistributeFlags {
     fn augment_args(command: Command) -> Command {
         let is_wanted = |option: &OptionSpec| {
-            option.shapes_mark && !SUBJECTS.contains(&option.name) || option.name == "ATTRIBUTES"
+            option.shapes_mark && !SUBJECTS.contains(&option.name) || OF_DISTRIBUTE.contains(&option.name)
         };
         command.args(flags("How the map is marked", is_wanted))
     }

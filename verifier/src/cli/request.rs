@@ -14,7 +14,7 @@ use meshmark_verifier::{
         private_copy::PrivateCopy,
         texts::{self, ReadRecord},
     },
-    verify::{Sought, check_key},
+    verify::{Sought, check_key, lineage_of},
 };
 
 /// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
@@ -37,6 +37,7 @@ pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<R
     let request = |options: Options| {
         Ok(Request {
             sought: sought(&options, &key, args.demodulator.into(), tried)?,
+            lineage: record.as_ref().map(|read| lineage_of(&read.record)).unwrap_or_default(),
             tried,
             subject: options.subject,
             key: key.clone(),

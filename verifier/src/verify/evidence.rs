@@ -9,7 +9,7 @@ use meshmark_core::{
     estimation::Estimates,
     fingerprint::{Fingerprint, pilots, recipient_signs},
     key::SecretKey,
-    part::PartDigest,
+    part::Parts,
 };
 use meshmark_detection::{
     Demodulated, Estimated, Matched, Observations,
@@ -44,8 +44,8 @@ pub struct MessageEvidence {
 pub struct FingerprintEvidence {
     /// The estimates of all signs.
     pub estimates: Estimates,
-    /// The part of the map, on which the signs depend.
-    pub part: PartDigest,
+    /// The parts of the map, on which the signs depend.
+    pub parts: Parts,
     /// The standing of each recipient, and the answer about it.
     pub recipients: Vec<(Standing, Answer)>,
     /// The agreement of the key's pilots.
@@ -114,9 +114,9 @@ fn of_fingerprints(
     progress: &mut Progress,
 ) -> meshmark_core::Result<(Found, Surroundings)> {
     let (parameters, significance) = (&request.parameters, request.significance);
-    let part = PartDigest::of(&matched.reference.data.vertices);
-    let pilots = pilots(&request.key, &part);
-    let fingerprint = |recipient: &String| Fingerprint::new(&request.key, &part, recipient);
+    let parts = matched.reference.parts.clone();
+    let pilots = pilots(&request.key, &parts);
+    let fingerprint = |recipient: &String| Fingerprint::new(&request.key, &parts, recipient);
     let fingerprints: Vec<Fingerprint> = recipients.iter().map(fingerprint).collect();
     let seen = progress.listen(|listener| matched.estimate(parameters, listener))?;
     let power =
@@ -153,7 +153,7 @@ fn of_fingerprints(
     let surroundings =
         Surroundings { radius, matches, deformation: Some(deformation), weights, observations };
     let found =
-        FingerprintEvidence { estimates, part, recipients, pilots, recipient_decoys, key_decoys, noise_m };
+        FingerprintEvidence { estimates, parts, recipients, pilots, recipient_decoys, key_decoys, noise_m };
     Ok((Found::Fingerprint(found), surroundings))
 }
 
@@ -161,7 +161,7 @@ impl FingerprintEvidence {
     /// Returns the score of a recipient in every patch alone; `None` where nothing was observed.
     pub fn patch_scores(&self, key: &SecretKey, recipient: &str) -> Vec<Option<f64>> {
         let evidence = Evidence::of_recipients(&self.estimates);
-        let signs = recipient_signs(key, &self.part, recipient);
+        let signs = recipient_signs(key, &self.parts, recipient);
         let score = |patch: Agreement| (patch.signs > 0).then_some(patch.score);
         evidence.patch_agreements(&signs).into_iter().map(score).collect()
     }

@@ -9,7 +9,8 @@ use super::{
     disclosed,
     evidence::Found,
     examination::{Examination, Suited, examine, read_reference},
-    request::{Request, Sought},
+    references::read_bases,
+    request::{Request, Sought, lineage_of},
 };
 use crate::{
     Error, Result,
@@ -20,7 +21,7 @@ use crate::{
 use meshmark_core::{
     key::SecretKey,
     message::Message,
-    options::{Options, Subject},
+    options::{Options, Spelling, Subject},
     recorded::Recorded,
 };
 use meshmark_dataset::Survey;
@@ -93,7 +94,14 @@ pub fn verify_records(
     let mut of_group = Vec::new();
     for (group, reference) in of_references {
         let request = group.request(tried);
-        match examine(&request, &reference, progress)? {
+        let bases = match read_bases(&request, references) {
+            Err(Error::Dataset(lost)) => {
+                skip_all(&group, &lost.text(Spelling::Flag), &mut skip);
+                continue;
+            }
+            bases => bases?,
+        };
+        match examine(&request, (&reference, &bases), progress)? {
             Suited::Yes(seen) => {
                 of_group.push(group.candidates);
                 examined.push((request, seen));
@@ -194,16 +202,21 @@ fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
         let (sought, Options { parameters, layers, srs, .. }) = (candidate.sought(), &candidate.options);
+        let lineage = lineage_of(&candidate.read.record);
         let same = |group: &&mut Group| {
             let r = &group.request;
-            r.parameters == *parameters && r.layers == *layers && r.srs == *srs && r.sought.is_like(&sought)
+            r.parameters == *parameters
+                && r.layers == *layers
+                && r.srs == *srs
+                && r.sought.is_like(&sought)
+                && r.lineage == lineage
         };
         if let Some(group) = groups.iter_mut().find(same) {
             group.candidates.push(candidate);
             continue;
         }
         let (parameters, layers, srs) = (parameters.clone(), layers.clone(), srs.clone());
-        let request = Request { parameters, layers, srs, sought, ..request.clone() };
+        let request = Request { parameters, layers, srs, sought, lineage, ..request.clone() };
         groups.push(Group { request, candidates: vec![candidate] });
     }
     groups

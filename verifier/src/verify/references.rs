@@ -5,8 +5,8 @@ use super::{
     examination::{Suited, read_reference},
     request::Request,
 };
-use crate::{Error, Result, progress::Progress};
-use meshmark_dataset::Survey;
+use crate::{Error, Result, inputs::maps, progress::Progress};
+use meshmark_dataset::{Bases, Survey};
 use std::path::PathBuf;
 
 /// Reads the only reference, or that of several from which the record of the request was made.
@@ -38,4 +38,12 @@ pub fn read_own_reference(
         }
     }
     Err(Error::NoReferenceOfRecord { references: references.len() })
+}
+
+/// Finds the editions that the record of a request rests on among the references.
+///
+/// # Errors
+/// Fails when a reference is unreadable, and when one is missing.
+pub fn read_bases(request: &Request, references: &[PathBuf]) -> Result<Bases> {
+    Bases::find(request.lineage.bases.clone(), references, &mut maps::base_reference)
 }

@@ -4,8 +4,9 @@ use crate::inputs::{private_copy::PrivateCopy, texts::ReadRecord};
 use meshmark_core::{
     key::SecretKey,
     options::{Parameters, Subject},
+    recorded::Recorded,
 };
-use meshmark_dataset::LabelFields;
+use meshmark_dataset::{LabelFields, marking::Lineage};
 use meshmark_detection::{
     Demodulator, Mark, decision::Expected, matching::RadiusChoice, registration::Start,
 };
@@ -58,6 +59,9 @@ pub struct Request {
     pub subject: Option<Subject>,
     /// What the mark carries.
     pub sought: Sought,
+    /// The parts of the fingerprint and the editions that it rests on, from a record that names
+    /// some.
+    pub lineage: Lineage,
     /// Number of the marks that are tried, this one included, as nobody recorded which it is.
     pub tried: usize,
     /// The parameters of the mark.
@@ -83,6 +87,16 @@ pub struct Request {
     pub evidence_map: bool,
     /// Whether these two hold the exact displacements of vertices.
     pub exact_displacements: bool,
+}
+
+/// Returns the lineage of a record that rests on earlier editions.
+pub fn lineage_of(record: &Recorded) -> Lineage {
+    match record {
+        Recorded::Fingerprint(record) if !record.bases.is_empty() => {
+            Lineage { parts: record.parts.clone(), bases: record.bases.clone() }
+        }
+        _ => Lineage::default(),
+    }
 }
 
 impl Request {
