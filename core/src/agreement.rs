@@ -49,16 +49,16 @@ pub struct Evidence {
 impl Evidence {
     /// Selects the estimates of signs that belong to a recipient.
     pub fn of_recipients(estimates: &Estimates) -> Self {
-        Self::of(estimates, |i| !is_pilot(i))
+        Self::selected(estimates, |i| !is_pilot(i))
     }
 
     /// Selects the estimates of pilots, whose signs belong to the key, whoever the recipient is.
     pub fn of_pilots(estimates: &Estimates) -> Self {
-        Self::of(estimates, is_pilot)
+        Self::selected(estimates, is_pilot)
     }
 
     /// Selects coefficients by their number in patch and axis, counted from 1.
-    fn of(estimates: &Estimates, is_in_question: impl Fn(usize) -> bool) -> Self {
+    fn selected(estimates: &Estimates, is_in_question: impl Fn(usize) -> bool) -> Self {
         let Estimates { values, variances, coefficients } = estimates;
         let keep = |(i, value): (usize, f64)| if is_in_question(i % coefficients + 1) { value } else { 0.0 };
         Evidence {

@@ -114,7 +114,7 @@ impl<'a> FingerprintEmbedding<'a> {
         let works = parts.into_iter().map(|(edition, _, groundwork)| PartWork { edition, groundwork });
         let works: Vec<PartWork> = works.collect();
         let named = works.iter().map(|PartWork { groundwork, .. }| {
-            (PartDigest::of(groundwork.map.vertices), groundwork.patches.as_slice().len())
+            (PartDigest::new(groundwork.map.vertices), groundwork.patches.as_slice().len())
         });
         let parts = Parts::in_turn(named);
         Ok(FingerprintEmbedding { series, works, key, parts })

@@ -280,7 +280,7 @@ mod tests {
                 crs: Some("EPSG:3067".into()),
             },
             copy: CopyEntry { file_sha256: Some("0f".repeat(32)) },
-            parts: vec![PartEntry { sha256: PartDigest::of(&vertices), vertices: 1, patches: 1 }],
+            parts: vec![PartEntry { sha256: PartDigest::new(&vertices), vertices: 1, patches: 1 }],
             bases: Vec::new(),
             distortion: Distortion {
                 displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },

@@ -11,7 +11,7 @@ pub struct PartDigest([u8; 32]);
 
 impl PartDigest {
     /// Returns the name of the part that has these vertices.
-    pub fn of(vertices: &VertexTable) -> Self {
+    pub fn new(vertices: &VertexTable) -> Self {
         PartDigest(vertices.sha256())
     }
 
@@ -36,7 +36,7 @@ pub struct PlacedPart {
 impl Parts {
     /// Returns the only part of a map that has these vertices.
     pub fn whole(vertices: &VertexTable) -> Self {
-        Parts(vec![PlacedPart { digest: PartDigest::of(vertices), first_patch: 0 }])
+        Parts(vec![PlacedPart { digest: PartDigest::new(vertices), first_patch: 0 }])
     }
 
     /// Puts parts one after the other, given the name and the number of patches of each.

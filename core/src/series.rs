@@ -64,7 +64,7 @@ struct OwnPart {
 
 impl<'a> Series<'a> {
     /// Returns the series of a single map.
-    pub fn of(map: Map<'a>, parameters: &'a Parameters) -> Self {
+    pub fn of_one(map: Map<'a>, parameters: &'a Parameters) -> Self {
         Series { editions: vec![Edition { map, changes: None }], parameters }
     }
 
@@ -152,7 +152,7 @@ impl<'a> Series<'a> {
         })?;
         let index = |point: &[f64; 2]| map.vertices.index_of(*point).expect("it has all vertices") as u32;
         let placed = parts.into_iter().map(|(_, part, patches)| {
-            let digest = PartDigest::of(part.vertices);
+            let digest = PartDigest::new(part.vertices);
             (digest, patches, part.vertices.coords().iter().map(index).collect::<Vec<u32>>())
         });
         let placed: Vec<_> = placed.collect();

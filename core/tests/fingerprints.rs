@@ -7,7 +7,9 @@ use meshmark_core::{
     deformation::Prediction,
     embedding::{self, Marked},
     estimation::Estimates,
-    fingerprint::{self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, pilots, recipient_signs},
+    fingerprint::{
+        self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, pilots, recipient_signs,
+    },
     ground::Ground,
     key::SecretKey,
     map::Map,
@@ -51,7 +53,7 @@ fn embed(
     coefficients: usize,
     parameters: &Parameters,
 ) -> Result<Marked, Error> {
-    let series = Series::of(*map, parameters);
+    let series = Series::of_one(*map, parameters);
     fingerprint::embed(&series, key, recipient, coefficients).map(|(marked, _)| marked)
 }
 
@@ -102,7 +104,7 @@ fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
     let town = town();
     let (map, key, parameters) =
         (town.on(&Ground::METRES, &Ground::METRES), key(), Parameters::of_fingerprint());
-    let series = Series::of(map, &parameters);
+    let series = Series::of_one(map, &parameters);
     let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let embedding = embedding.for_many().unwrap();
     let names = ["ACME", "Öster AB"];

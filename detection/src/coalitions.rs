@@ -97,7 +97,8 @@ impl Matched<'_> {
         let views = [suspect, &self.moved]
             .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
         let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        let pilots_m = displacements_m(patches, &[PilotsAlone(pilots.clone())], coefficients, parameters)?.remove(0);
+        let pilots_m =
+            displacements_m(patches, &[PilotsAlone(pilots.clone())], coefficients, parameters)?.remove(0);
         self.score_without_pilots(&views[0], &pilots_m, candidates, parameters, tried, standings)?;
         let chosen = self.chosen(standings);
         let of_chosen: Vec<Fingerprint> = chosen.iter().map(|&k| candidates[k].clone()).collect();

@@ -46,7 +46,7 @@ static TOWN: LazyLock<Town> = LazyLock::new(|| {
     let (data, indices) = rings(corners.clone());
     let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::of_fingerprint());
     let map = data.on(&Ground::METRES, &Ground::METRES);
-    let series = Series::of(map, &parameters);
+    let series = Series::of_one(map, &parameters);
     let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let marks: Vec<_> = (0..COPIES).map(|k| embedding.fingerprint(&name(k))).collect();
     let wanted = embedding.wanted(&marks, &|_| ()).unwrap();
@@ -85,7 +85,7 @@ fn random(i: usize) -> f64 {
 fn with_suspect<T>(corners: Vec<[f64; 2]>, f: impl FnOnce(&Matched) -> T) -> T {
     let town = &TOWN;
     let (map, parameters) = (town.data.on(&Ground::METRES, &Ground::METRES), Parameters::of_fingerprint());
-    let series = Series::of(map, &parameters);
+    let series = Series::of_one(map, &parameters);
     let reference = Reference::for_fingerprints(&town.data, &map, &series, COEFFICIENTS).unwrap();
     let (suspect, _) = rings(corners);
     let registration = Registrar::new(&town.data, &Ground::METRES, 1.0).register(&suspect, Start::None);

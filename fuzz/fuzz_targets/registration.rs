@@ -45,7 +45,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let parameters = Parameters { patch_size: PATCH_SIZE, ..Parameters::of_fingerprint() };
     let on_ground = reference.on(&ground, &ground);
-    let series = Series::of(on_ground, &parameters);
+    let series = Series::of_one(on_ground, &parameters);
     let Ok(prepared) = Reference::for_fingerprints(&reference, &on_ground, &series, 1) else { return };
     let matched = Matched::new(&prepared, &suspect, &registration, RadiusChoice::FromData);
     assert!(matched.radius.metres > 0.0 && matched.radius.metres.is_finite());

@@ -43,7 +43,7 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
     let (key, parameters) = (key(), &options.parameters);
     let map = read(&reference_path(), &Selection { geometries: true, ..Selection::default() });
     let on_ground = map.map(parameters).expect("a projected CRS");
-    let series = Series::of(on_ground, parameters);
+    let series = Series::of_one(on_ground, parameters);
     let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).expect("it fits");
     let fingerprint = embedding.fingerprint(RECIPIENT);
     let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| ()).expect("it converges");

@@ -113,7 +113,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     let request = Request {
         key: key.clone(),
         reference: reference.into(),
-        suspect: PrivateCopy::of("suspect", suspect)?,
+        suspect: PrivateCopy::make("suspect", suspect)?,
         record: None,
         subject: None,
         sought: Sought::Message { bits: 128 },

@@ -29,7 +29,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     warn_of_displacements(args.exact_displacements);
     let passphrase = args.opening.passphrase().for_child(&args.key)?;
-    let suspect = PrivateCopy::of("suspect", &args.suspect)?;
+    let suspect = PrivateCopy::make("suspect", &args.suspect)?;
     let arguments = command_line::of_examination(suspect.folder().as_os_str());
     let places = (args.suspect.as_path(), suspect.folder());
     let bar = Bar::default();

@@ -72,8 +72,8 @@ pub fn make(deposited: &Deposited, warn: &mut dyn FnMut(&str)) -> Result<Stateme
         key_commitment: key.commitment(),
         references: vertices,
         marks,
-        records: Tree::of(records.iter().map(|(_, read)| read.sha256.clone()).collect()),
-        recipients: Tree::of(records.iter().filter_map(|(_, read)| recipient(read)).collect()),
+        records: Tree::new(records.iter().map(|(_, read)| read.sha256.clone()).collect()),
+        recipients: Tree::new(records.iter().filter_map(|(_, read)| recipient(read)).collect()),
     };
     Ok(Statement::new(subjects(references)?, predicate))
 }

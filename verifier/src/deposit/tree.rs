@@ -18,7 +18,7 @@ pub struct Tree {
 
 impl Tree {
     /// Creates the tree of digests, each of which counts once.
-    pub fn of(mut digests: Vec<String>) -> Self {
+    pub fn new(mut digests: Vec<String>) -> Self {
         digests.sort();
         digests.dedup();
         Tree { merkle_root: root(&digests), digests }
@@ -70,7 +70,7 @@ mod tests {
             let mut sorted = digests[..count].to_vec();
             sorted.sort();
             let leaves: Vec<&[u8]> = sorted.iter().map(|digest| digest.as_bytes()).collect();
-            let tree = Tree::of(digests[..count].iter().rev().cloned().collect());
+            let tree = Tree::new(digests[..count].iter().rev().cloned().collect());
             assert_eq!(tree.merkle_root, hex::encode(&by_definition(&leaves)), "{count} leaves");
             assert!(tree.is_consistent() && digests[..count].iter().all(|digest| tree.holds(digest)));
             assert!(!tree.holds(&digests[count]));
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_tree_with_another_order_digest_or_root_is_not_consistent() {
-        let tree = Tree::of(["a", "b", "c"].map(String::from).to_vec());
+        let tree = Tree::new(["a", "b", "c"].map(String::from).to_vec());
         let mut other = tree.clone();
         other.digests.swap(0, 1);
         assert!(!other.is_consistent());

@@ -42,7 +42,7 @@ pub fn read(path: &Path) -> Result<Case> {
 mod tests {
     use super::*;
 
-    fn of(text: &str) -> Result<Case> {
+    fn parse(text: &str) -> Result<Case> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         read(file.path())
@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn a_case_file_may_have_any_of_its_fields_and_no_other() {
         let case =
-            of("number = \"7/26\"\nexaminer = \"A. B.\"\ndate = 2026-11-28\ncustody = [\"a\", \"b\"]\n")
+            parse("number = \"7/26\"\nexaminer = \"A. B.\"\ndate = 2026-11-28\ncustody = [\"a\", \"b\"]\n")
                 .unwrap();
         assert_eq!(
             case,
@@ -62,12 +62,15 @@ mod tests {
                 custody: vec!["a".into(), "b".into()],
             }
         );
-        assert_eq!(of("date = \"28 November 2026\"").unwrap().date.as_deref(), Some("28 November 2026"));
-        assert_eq!(of("").unwrap(), Case { number: None, examiner: None, date: None, custody: Vec::new() });
+        assert_eq!(parse("date = \"28 November 2026\"").unwrap().date.as_deref(), Some("28 November 2026"));
+        assert_eq!(
+            parse("").unwrap(),
+            Case { number: None, examiner: None, date: None, custody: Vec::new() }
+        );
         for (bad, words) in
             [("numbr = \"7\"", "unknown field"), ("number = 7", "invalid type"), ("number", "")]
         {
-            let error = of(bad).unwrap_err().to_string();
+            let error = parse(bad).unwrap_err().to_string();
             assert!(error.starts_with("the case file ") && error.contains(words), "{error}");
         }
     }

@@ -63,7 +63,7 @@ fn open_untouched(what: &'static str, path: &Path) -> Result<Opened> {
     if !has_logs(path) {
         return Ok(Opened { dataset: open(what, path)?, _copy: None });
     }
-    let copy = PrivateCopy::of(what, path)?;
+    let copy = PrivateCopy::make(what, path)?;
     journal::roll_back(what, &copy)?;
     let names = named_as(path, copy.copy());
     let dataset = open_with(copy.copy(), None, &[]).map_err(|source| Error::Unopened {

@@ -125,7 +125,7 @@ pub fn conclude_fingerprint(
     };
     let fingerprint = FingerprintEntry {
         recipient: Some(of_recipient),
-        patches: Some(PatchAgreement::of(&scores)),
+        patches: Some(PatchAgreement::new(&scores)),
         recipient_decoys: scored(&found.recipient_decoys, Some(standing.agreement.score)),
         ..of_key
     };
