@@ -32,7 +32,7 @@ build: deps
 # They compile neither plots nor benchmarks. openssl is the time-stamping authority.
 test: build
 	@./install-deps.sh openssl
-	$(WITH_GDAL) $(CARGO) test --release --locked
+	RUST_TEST_THREADS=$$(($$(nproc) * 2)) $(WITH_GDAL) $(CARGO) test --release --locked
 
 # What the studies make of their own figures.
 test-studies: build
@@ -148,7 +148,7 @@ lint: deps
 	$(CARGO) fmt --all -- --check
 	$(CARGO) fmt --manifest-path fuzz/Cargo.toml -- --check
 	$(WITH_GDAL) $(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
-	$(WITH_GDAL) $(CARGO) test --release --locked -p meshmark-host-tests --test architecture
+	$(WITH_GDAL) $(CARGO) test --release --locked --test architecture
 
 deps:
 	@./install-deps.sh

@@ -93,6 +93,7 @@ pub enum RecordFault {
     Digest { text: String },
     NoPart,
     UnknownBase { digest: String },
+    OwnBase,
     NoRecipient,
 }
 
@@ -116,6 +117,7 @@ impl fmt::Display for RecordFault {
             RecordFault::UnknownBase { digest } => {
                 write!(f, "a base has the base {digest}, which is not listed before it")
             }
+            RecordFault::OwnBase => f.write_str("it names its own edition as a base"),
             RecordFault::NoPart => f.write_str("it names no part of the map"),
             RecordFault::NoRecipient => f.write_str("it has no recipient"),
         }

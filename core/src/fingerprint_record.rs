@@ -227,6 +227,10 @@ impl FingerprintRecord {
         let late = |(number, base): (usize, &BaseEntry)| {
             base.bases.iter().find(|digest| !named(digest, number)).cloned()
         };
+        let is_own = |base: &&BaseEntry| base.vertices_sha256 == self.reference.vertices_sha256;
+        if self.bases.iter().any(|base| is_own(&base)) {
+            return fault(RecordFault::OwnBase);
+        }
         if let Some(digest) = self.bases.iter().enumerate().find_map(late) {
             return fault(RecordFault::UnknownBase { digest });
         }

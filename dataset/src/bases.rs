@@ -56,10 +56,15 @@ impl Bases {
             };
         };
         let mut entries: Vec<BaseEntry> = Vec::new();
+        let own_digest = map.data.vertices.digest();
         for path in records_at(named)? {
             let record = read_record(&path)?;
             check_record(&path, &record, options, key, map)?;
-            for entry in record.chain() {
+            // A copy of this very edition for somebody else is no earlier edition, but it may name some.
+            if record.reference.vertices_sha256 == own_digest && record.bases.is_empty() {
+                return Err(Error::BaseOfThisEdition { base: path }.into());
+            }
+            for entry in record.chain().into_iter().filter(|entry| entry.vertices_sha256 != own_digest) {
                 match entries.iter().find(|known| known.vertices_sha256 == entry.vertices_sha256) {
                     None => entries.push(entry),
                     Some(known) if *known == entry => {}
@@ -223,6 +228,10 @@ fn check_record(
     if let Some(option) = SHARED.iter().find(differs) {
         let (made_with, given) = (recorded.text_of(option), options.text_of(option));
         return Err(Error::BaseOfOtherMark { base: base(), option, made_with, given });
+    }
+    let whole = &record.reference.vertices_sha256;
+    if record.bases.is_empty() && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
+        return Err(Error::BaseOfOtherParts { base: base() });
     }
     match options.coefficients == recorded.coefficients {
         true => Ok(()),

@@ -44,6 +44,8 @@ pub enum Error {
     BaseInOtherCrs { base: PathBuf },
     BaseOfOtherMark { base: PathBuf, option: &'static str, made_with: Option<String>, given: Option<String> },
     ContradictingBase { base: PathBuf },
+    BaseOfThisEdition { base: PathBuf },
+    BaseOfOtherParts { base: PathBuf },
     NoRecordOfBase { folder: PathBuf },
     LostBase { vertices_sha256: String },
     OtherBase { base: String },
@@ -130,6 +132,8 @@ impl Error {
             Error::LostBase { .. }
                 | Error::OtherBase { .. }
                 | Error::ContradictingBase { .. }
+                | Error::BaseOfThisEdition { .. }
+                | Error::BaseOfOtherParts { .. }
                 | Error::BaseOfOtherKey { .. }
                 | Error::BaseInOtherCrs { .. }
                 | Error::BaseOfOtherMark { .. }
@@ -294,6 +298,18 @@ impl Error {
                     base(path),
                     value(made_with),
                     value(given)
+                )
+            }
+            Error::BaseOfThisEdition { base: path } => format!(
+                "{} is of this very edition, and not of an earlier one: name the record of the edition before, or leave \
+                 {} out",
+                base(path),
+                spelling.name("BASE")
+            ),
+            Error::BaseOfOtherParts { base: path } => {
+                format!(
+                    "{} names parts that are not those of its reference: give the record as it was written",
+                    base(path)
                 )
             }
             Error::ContradictingBase { base: path } => format!(

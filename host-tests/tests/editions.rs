@@ -122,7 +122,6 @@ fn a_base_that_does_not_belong_to_the_edition_is_refused_and_nothing_is_written(
         (&["BASE=1.json"][..], "BASE is given without BASE_REFERENCE"),
         (&[one], "BASE_REFERENCE is given without BASE"),
         (&["BASE=1.json", "BASE_REFERENCE=3.gpkg"], "no map given is the reference of a base"),
-        (&["BASE=2.json", one], "no map given is the reference of a base"),
         (&["BASE=1.json", "BASE_REFERENCE=lost.gpkg"], "BASE_REFERENCE=lost.gpkg cannot be read"),
         (&["BASE=1.json", "BASE_REFERENCE=MESHMARK:1.gpkg"], "marked view"),
         (&["BASE=lost.json", one], "BASE=lost.json cannot be read"),
@@ -140,6 +139,41 @@ fn a_base_that_does_not_belong_to_the_edition_is_refused_and_nothing_is_written(
         let before = host.files();
         let run = mark(&host, "out.gpkg", "2.gpkg", &[options, &["RECORD=out.json"]].concat());
         assert!(run.code.is_some_and(|code| code != 0), "{options:?}");
+        let [error] = run.errors()[..] else { panic!("one failure, not {:?}", run.stderr) };
+        assert!(error.contains(words), "{options:?}: {error}");
+        assert!(host.files() == before, "{options:?}");
+    }
+}
+
+#[test]
+fn the_record_of_another_copy_of_the_same_edition_is_no_base_of_it() {
+    let host = series();
+    fs::create_dir(host.path("records")).unwrap();
+    for number in 1..3 {
+        fs::copy(host.path(&format!("{number}.json")), host.path(&format!("records/{number}.json"))).unwrap();
+    }
+    let options = ["BASE=records", "BASE_REFERENCE=1.gpkg", "RECORD=records/again.json"];
+    for _ in 0..2 {
+        let run = mark(&host, "again.gpkg", "2.gpkg", &options);
+        run.succeeds();
+        assert_eq!(moved(&host, 2, "again.gpkg"), moved(&host, 2, "copy2.gpkg"));
+        fs::remove_file(host.path("again.gpkg")).unwrap();
+    }
+    let record: Value = serde_json::from_slice(&fs::read(host.path("records/again.json")).unwrap()).unwrap();
+    assert_eq!(record["bases"].as_array().unwrap().len(), 1);
+    let mut alone: Value = serde_json::from_slice(&fs::read(host.path("2.json")).unwrap()).unwrap();
+    alone["bases"] = serde_json::json!([]);
+    fs::write(host.path("alone.json"), alone.to_string()).unwrap();
+    for (source, options, words) in [
+        ("1.gpkg", ["BASE=1.json", "BASE_REFERENCE=1.gpkg"], "BASE=1.json is of this very edition"),
+        (
+            "3.gpkg",
+            ["BASE=alone.json", "BASE_REFERENCE=2.gpkg"],
+            "names parts that are not those of its reference",
+        ),
+    ] {
+        let before = host.files();
+        let run = mark(&host, "out.gpkg", source, &options);
         let [error] = run.errors()[..] else { panic!("one failure, not {:?}", run.stderr) };
         assert!(error.contains(words), "{options:?}: {error}");
         assert!(host.files() == before, "{options:?}");

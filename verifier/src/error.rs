@@ -81,6 +81,10 @@ pub enum Error {
         folder.display()
     )]
     NoRecord { folder: PathBuf },
+    #[error("the folder {} has no record (*.json): give the folder the records were written to", folder.display())]
+    NothingListed { folder: PathBuf },
+    #[error("--time-stamp-request has nothing to answer it: give the response to it with --time-stamp")]
+    NoAnswer,
     #[error(
         "the reference has {} and the marked map {marked}: compare a map with the copy that was marked from it, before \
          anything is removed",

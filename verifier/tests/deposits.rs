@@ -257,3 +257,27 @@ fn a_reference_saved_anew_keeps_its_vertices_and_is_said_to_be_another_file() {
         "{text}"
     );
 }
+
+#[test]
+fn a_record_that_is_there_twice_does_not_stand_for_another_one() {
+    let vendor = Vendor::new();
+    fs::copy(vendor.path("records/acme.json"), vendor.path("records/message.json")).unwrap();
+    let (code, text) = vendor.verify();
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("fixed:        1 record\n"), "{text}");
+    assert!(text.contains("1 record of the deposit that the folder lacks"), "{text}");
+}
+
+#[test]
+fn a_record_that_was_cut_is_refused_and_a_request_needs_its_answer() {
+    let vendor = Vendor::new();
+    let request = ["deposit", "--verify", "series.deposit", "--time-stamp-request", "series.tsq"];
+    let (code, text) = vendor.run(&request);
+    assert!(code == Some(2) && text.contains("give the response to it with --time-stamp"), "{text}");
+    for cut in ["", "{\n  \"mesh"] {
+        fs::write(vendor.path("records/acme.json"), cut).unwrap();
+        let (code, text) = vendor.deposit("again.deposit");
+        assert!(code == Some(2) && text.contains("acme.json"), "{text}");
+        assert!(!vendor.path("again.deposit").exists());
+    }
+}

@@ -122,3 +122,18 @@ fn the_terminal_asks_for_a_passphrase_that_the_child_needs() {
     let (code, text) = verify("battery staple\n");
     assert!(code == Some(2) && text.contains("does not open protected.json"), "{code:?} {text}");
 }
+
+#[test]
+fn a_passphrase_that_is_given_protects_every_new_secret() {
+    const PROTECTED: &str = "-----BEGIN AGE ENCRYPTED FILE-----\n";
+    let vendor = vendor();
+    let is_protected = |name: &str| fs::read_to_string(vendor.path(name)).unwrap().starts_with(PROTECTED);
+    assert_eq!(vendor.run(&["keygen", "--passphrase-file", "passphrase", "other.json"]).0, Some(0));
+    assert!(is_protected("other.json") && is_protected("other.signing.pem"));
+    for file in ["other.signing.pem", "other.public.pem"] {
+        fs::remove_file(vendor.path(file)).unwrap();
+    }
+    let again = ["keygen", "--signing-key-only", "--passphrase-file", "passphrase", "other.json"];
+    let (code, text) = vendor.run(&again);
+    assert!(code == Some(0) && is_protected("other.signing.pem"), "{text}");
+}

@@ -64,6 +64,16 @@ pub(super) enum Subcommands {
     /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable map, 6 too
     /// large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
+    /// List who received which copy, from the records of a folder
+    ///
+    /// The table is CSV: recipient, edition (SHA-256 of the vertices of the unmarked map), number of
+    /// earlier editions, record, copy beside the record, its SHA-256, whether it is the recorded one,
+    /// and the day on which it was last written. Exit codes: 0 listed, 2 usage, or no readable records,
+    /// 5 unreadable copy.
+    Records {
+        /// Folder of the records (*.json), such as the output of `meshmark distribute`
+        folder: PathBuf,
+    },
     /// Write man pages and shell completions, for packagers
     #[command(hide = true)]
     PackageFiles {
@@ -94,6 +104,13 @@ pub(super) struct OpeningFlags {
     /// needed
     #[arg(long, value_name = "FILE")]
     pub(super) passphrase_file: Option<PathBuf>,
+}
+
+impl KeygenArgs {
+    /// Returns whether the user asks for protection: a file with a passphrase has no other purpose.
+    pub(super) fn is_protected(&self) -> bool {
+        self.passphrase || self.opening.passphrase_file.is_some()
+    }
 }
 
 impl OpeningFlags {

@@ -6,7 +6,7 @@ use super::{
 };
 use meshmark_core::counted;
 use meshmark_verifier::{
-    Result,
+    Error, Result,
     deposit::{self, Deposit, DepositFiles, Deposited, Opened, Predicate, SigningKey, signing_key_file},
     inputs::texts,
     outputs::NewFile,
@@ -63,6 +63,9 @@ fn sending(request: &Path) -> String {
 }
 
 fn verify(args: &DepositArgs, path: &Path) -> Result<()> {
+    if args.time_stamp_request.is_some() && args.trust.time_stamp.is_none() {
+        return Err(Error::NoAnswer);
+    }
     let opened = Opened::read(&files(path, &args.trust, args.time_stamp_request.as_deref()))?;
     let passphrase = args.opening.passphrase();
     let key = args.key.as_deref().map(|path| texts::key(path, &passphrase, &mut warn)).transpose()?;

@@ -8,7 +8,10 @@ use meshmark_core::key::SecretKey;
 use meshmark_verifier::{
     Error, Result,
     deposit::{SigningKey, public_key_file, signing_key_file},
-    inputs::{passphrase::Passphrase, texts},
+    inputs::{
+        passphrase::{Passphrase, is_protected_file},
+        texts,
+    },
     outputs::NewFile,
 };
 use zeroize::Zeroizing;
@@ -16,14 +19,18 @@ use zeroize::Zeroizing;
 pub(super) fn run(args: &KeygenArgs) -> Result<()> {
     let path = &args.key_file;
     let (signing_path, public_path) = (signing_key_file(path), public_key_file(path));
+    let file = args.opening.passphrase_file.as_deref();
+    let known = Passphrase::new(file);
     if args.signing_key_only {
-        texts::key(path, &args.opening.passphrase(), &mut warn)?; // the new key pair belongs to it
+        texts::key(path, &known, &mut warn)?; // the new key pair belongs to it
     }
     let key_file = (!args.signing_key_only).then(|| NewFile::secret("key file", path)).transpose()?;
     let signing_file = NewFile::secret("signing key", &signing_path)?;
     let public_file = NewFile::new("public key", &public_path)?;
-    let file = args.opening.passphrase_file.as_deref();
-    let passphrase = args.passphrase.then(|| Passphrase::chosen(file)).transpose()?;
+    let passphrase = match args.signing_key_only && is_protected_file(path) {
+        true => Some(known), // both have the same one
+        false => args.is_protected().then(|| Passphrase::chosen(file)).transpose()?,
+    };
     let protected = |text: Zeroizing<String>| match &passphrase {
         Some(passphrase) => passphrase.protect(&text).map(Zeroizing::new),
         None => Ok(text),

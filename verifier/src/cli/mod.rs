@@ -15,7 +15,7 @@ use meshmark_core::{counted, options::Options};
 use meshmark_verifier::{
     Error, Result,
     compare::{Comparison, Details, compare, detail::ComparedFiles},
-    distribute, html,
+    copies_index, distribute, html,
     inputs::{gdal_failures, texts},
     outputs::{Format, ReportFile},
     progress::Progress,
@@ -37,6 +37,7 @@ pub fn run() -> u8 {
         Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
         Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
         Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),
+        Subcommands::Records { folder } => list_copies(&folder).map(|()| DONE),
     };
     result.unwrap_or_else(|error| {
         warn(&error.to_string());
@@ -96,4 +97,8 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     };
     print(&format!("{} written to {}{before}\n", counted(done.written, "copy"), request.folder.display()))?;
     Ok(())
+}
+
+fn list_copies(folder: &Path) -> Result<()> {
+    print(&copies_index::to_csv(&copies_index::index(folder, &mut warn)?))
 }

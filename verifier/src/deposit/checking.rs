@@ -9,7 +9,10 @@ use crate::{
     words::printable,
 };
 use meshmark_core::{counted, key::SecretKey};
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 /// Things that are compared with a deposit, one after the other.
 pub(super) struct Comparison<'a> {
@@ -163,11 +166,11 @@ fn check_records(
         }
         comparison.check_record(&name, &read.sha256)?;
     }
+    let found = records.iter().map(|(_, read)| &read.sha256).collect::<BTreeSet<_>>().len();
     let all = comparison.deposit.statement().predicate.records.digests.len();
-    comparison.standing.fixed.push(counted(records.len(), "record"));
-    if records.len() < all {
-        let missing =
-            format!("{} of the deposit that the folder lacks", counted(all - records.len(), "record"));
+    comparison.standing.fixed.push(counted(found, "record"));
+    if found < all {
+        let missing = format!("{} of the deposit that the folder lacks", counted(all - found, "record"));
         comparison.not_fixed(&missing);
     }
     Ok(())

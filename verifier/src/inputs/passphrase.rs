@@ -130,6 +130,6 @@ fn first_line(source: impl Read) -> io::Result<Zeroizing<String>> {
 const LONGEST_PASSPHRASE: u64 = 4096;
 
 /// Returns whether a file holds a protected key. A pipe can be read once only, by the child.
-fn is_protected_file(path: &Path) -> bool {
+pub fn is_protected_file(path: &Path) -> bool {
     path.is_file() && File::open(path).and_then(read_text).is_ok_and(|text| is_protected(&text))
 }

@@ -138,10 +138,9 @@ pub fn records(folder: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<(PathBuf
     Ok(records)
 }
 
-/// Returns whether a text calls itself a record, or is so damaged that nobody can say.
+/// Returns whether a text calls itself a record, or is so damaged that nobody can say: no JSON at all.
 fn claims_to_be_record(text: &str) -> bool {
-    let parsed = serde_json::from_str::<Value>(text);
-    parsed.map_or_else(|_| text.contains("meshmark_record"), |value| value.get("meshmark_record").is_some())
+    serde_json::from_str::<Value>(text).map_or(true, |value| value.get("meshmark_record").is_some())
 }
 
 fn text(path: &Path) -> io::Result<Zeroizing<String>> {

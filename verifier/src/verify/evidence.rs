@@ -21,6 +21,7 @@ use meshmark_detection::{
     matching::{Matches, Radius},
     power::Power,
 };
+use std::collections::BTreeMap;
 
 /// The evidence about the mark that is sought.
 pub enum Found {
@@ -106,6 +107,20 @@ fn of_message(
     Ok((Found::Message(MessageEvidence { demodulation, power, decoys }), surroundings))
 }
 
+/// Returns every recipient once, and the place of each among these. Twice in a coalition, a recipient
+/// would be the noise that hides himself.
+fn distinct(recipients: &[String]) -> (Vec<&String>, Vec<usize>) {
+    let (mut names, mut numbers) = (Vec::new(), BTreeMap::new());
+    let mut number = |recipient| {
+        *numbers.entry(recipient).or_insert_with(|| {
+            names.push(recipient);
+            names.len() - 1
+        })
+    };
+    let places = recipients.iter().map(&mut number).collect();
+    (names, places)
+}
+
 /// Estimates all signs, and decides on the recipients of a request.
 fn of_fingerprints(
     request: &Request,
@@ -116,8 +131,9 @@ fn of_fingerprints(
     let (parameters, significance) = (&request.parameters, request.significance);
     let parts = matched.reference.parts.clone();
     let pilots = pilots(&request.key, &parts);
-    let fingerprint = |recipient: &String| Fingerprint::new(&request.key, &parts, recipient);
-    let fingerprints: Vec<Fingerprint> = recipients.iter().map(fingerprint).collect();
+    let (names, places) = distinct(recipients);
+    let fingerprint = |recipient: &&String| Fingerprint::new(&request.key, &parts, recipient);
+    let fingerprints: Vec<Fingerprint> = names.iter().map(fingerprint).collect();
     let seen = progress.listen(|listener| matched.estimate(parameters, listener))?;
     let power =
         progress.listen(|listener| Power::of_fingerprint(matched, &seen, &pilots, parameters, listener))?;
@@ -139,8 +155,8 @@ fn of_fingerprints(
             &mut standings,
         )?;
     }
-    let decide = |standing: Standing| (standing, grounds.decide(&standing));
-    let recipients = standings.into_iter().map(decide).collect();
+    let decide = |&place: &usize| (standings[place], grounds.decide(&standings[place]));
+    let recipients = places.iter().map(decide).collect();
     let pilots = seen.key_agreement(&pilots);
     let Estimated { estimates, radius, matches, disturbance, observations, .. } = seen;
     let deformation = disturbance.deformation;
@@ -164,5 +180,18 @@ impl FingerprintEvidence {
         let signs = recipient_signs(key, &self.parts, recipient);
         let score = |patch: Agreement| (patch.signs > 0).then_some(patch.score);
         evidence.patch_agreements(&signs).into_iter().map(score).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipient_of_several_records_is_one_candidate() {
+        let recipients = ["B", "A", "B", "C", "A"].map(String::from);
+        let (names, places) = distinct(&recipients);
+        assert_eq!(names, ["B", "A", "C"]);
+        assert_eq!(places, [0, 1, 0, 2, 1]);
     }
 }
