@@ -65,7 +65,7 @@ impl Matched<'_> {
             let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k].clone()).collect();
             let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
             let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
-            forget(&mut observed, &copies_m, |vertex| seen.disturbance.displacement_m[vertex]);
+            forget(&mut observed, &copies_m, &seen.disturbance.displacement_m);
             let estimates =
                 self.estimates(self.vertices(), &observed, &seen.disturbance, parameters, &|_| ())?;
             Ok(Evidence::of_recipients(&estimates).without(&named))
@@ -149,15 +149,11 @@ impl Matched<'_> {
 
 /// Forgets the vertices that lie where copies have them, which are displaced so far by their marks,
 /// and by `other_m` besides, metres.
-fn forget(
-    observed: &mut [Option<[f64; 2]>],
-    copies_m: &[Vec<[f64; 2]>],
-    other_m: impl Fn(usize) -> [f64; 2],
-) {
+fn forget(observed: &mut [Option<[f64; 2]>], copies_m: &[Vec<[f64; 2]>], other_m: &[[f64; 2]]) {
     let found = observed.iter().flatten().count() as f64;
     for copy_m in copies_m {
         let is_own = |vertex: &usize| {
-            let other_m = other_m(*vertex);
+            let other_m = other_m[*vertex];
             let gap = |o: [f64; 2]| [0, 1].map(|axis| o[axis] - other_m[axis] - copy_m[*vertex][axis]);
             observed[*vertex].map(gap).is_some_and(|[x, y]| x.hypot(y) <= SAME_M)
         };

@@ -31,7 +31,7 @@ use rayon::prelude::*;
 /// Bets, and each of three scores without pilots, have a hundredth of the error that the first scores
 /// have: their p-values are multiplied by 100, and all together err by at most 1.04 times the
 /// significance.
-pub(crate) const FURTHER_TESTS_LOG10: f64 = 2.0;
+const FURTHER_TESTS_LOG10: f64 = 2.0;
 
 /// At most so many innocent candidates are suspected, and at most this share of all.
 const SUSPECTED_BY_CHANCE: f64 = 32.0;
