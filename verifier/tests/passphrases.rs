@@ -8,6 +8,8 @@ use std::{
     io::{Read, Write},
     os::unix::fs::PermissionsExt,
     process::{Command, Stdio},
+    thread,
+    time::Duration,
 };
 
 /// A vendor whose keys the passphrase in the file `passphrase` protects; no unprotected key is left.
@@ -89,13 +91,20 @@ fn a_protected_key_is_opened_by_its_passphrase_alone() {
     assert!(code == Some(0) && text.contains("fixed:        key"), "{text}");
 }
 
+/// Whether the terminal shows what is typed.
+fn shows_typing(terminal: &str) -> bool {
+    let settings = Command::new("stty").args(["-a", "-F", terminal]).output().unwrap();
+    assert!(settings.status.success(), "{terminal}: {}", String::from_utf8_lossy(&settings.stderr));
+    String::from_utf8(settings.stdout).unwrap().split_whitespace().any(|setting| setting == "echo")
+}
+
 /// `script` gives a command a terminal.
 #[test]
 fn the_terminal_asks_for_a_passphrase_that_the_child_needs() {
     let vendor = vendor();
     let suspect = fixture("vectors/fingerprint/marked.gpkg");
     let command = format!(
-        "{} verify --key protected.json --reference map.gpkg --recipient ACME {}",
+        "tty; exec {} verify --key protected.json --reference map.gpkg --recipient ACME {}",
         env!("CARGO_BIN_EXE_meshmark"),
         suspect.display()
     );
@@ -104,12 +113,16 @@ fn the_terminal_asks_for_a_passphrase_that_the_child_needs() {
         script.args(["-qec", &command, "/dev/null"]).current_dir(vendor.0.path());
         script.env("GDAL_DRIVER_PATH", "none").stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut started = script.spawn().unwrap();
-        // The terminal shows what is typed before the question turns that off.
         let (mut asked, mut output) = (Vec::new(), started.stdout.take().unwrap());
         while !asked.ends_with(b"Passphrase of protected.json: ") {
             let mut byte = [0];
             output.read_exact(&mut byte).unwrap();
             asked.extend(byte);
+        }
+        // The question comes before the terminal stops to show what is typed.
+        let terminal = String::from_utf8(asked).unwrap().lines().next().unwrap().to_owned();
+        while shows_typing(&terminal) {
+            thread::sleep(Duration::from_millis(10));
         }
         started.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
         let mut answer = String::new();
