@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz sanitizers \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz fuzz-build sanitizers \
 	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
@@ -85,6 +85,9 @@ faults: build
 # Every fuzz target for so long, side by side: make fuzz SECONDS=600 TARGETS="key record".
 fuzz: deps
 	$(WITH_GDAL) CARGO=$(CARGO) fuzz/run.sh $(or $(SECONDS),60) $(TARGETS)
+
+fuzz-build: deps
+	$(WITH_GDAL) CARGO=$(CARGO) fuzz/build.sh $(TARGETS)
 
 # The driver under AddressSanitizer, UndefinedBehaviorSanitizer and valgrind.
 sanitizers: build
