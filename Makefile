@@ -32,7 +32,7 @@ build: deps
 # They compile neither plots nor benchmarks. openssl is the time-stamping authority.
 test: build
 	@./install-deps.sh openssl
-	RUST_TEST_THREADS=$$(($$(nproc) * 2)) $(WITH_GDAL) $(CARGO) test --release --locked
+	RUST_TEST_THREADS=$$(($$(nproc) * 2)) $(WITH_GDAL) $(CARGO) test --release --locked --no-fail-fast
 
 # What the studies make of their own figures.
 test-studies: build

@@ -378,7 +378,9 @@ mod tests {
     fn messages_name_a_crs_by_its_code_or_its_name_and_tell_those_of_one_name_apart() {
         let crs = |text: &str| parse_srs(text).unwrap();
         assert_eq!(crs("EPSG:3903").brief_name(), "EPSG:3903");
-        assert_eq!(crs("EPSG:3067+3900").brief_name(), "ETRS89 / TM35FIN(E,N) + N2000 height");
+        // Versions of PROJ name this CRS after different datums.
+        let compound = crs("EPSG:3067+3900").brief_name();
+        assert!(compound.ends_with(" / TM35FIN(E,N) + N2000 height"), "{compound}");
         let [utm35, utm36] = ["+proj=utm +zone=35 +ellps=GRS80", "+proj=utm +zone=36 +ellps=GRS80"].map(crs);
         assert!(utm35.brief_name().contains("+zone=35"), "{}", utm35.brief_name());
         let named = |zone: &CoordinateSystem| crs(&zone.label().replacen("\"unknown\"", "\"Town grid\"", 1));

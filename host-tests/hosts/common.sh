@@ -40,8 +40,9 @@ verify() {
     local what=$1 reference=$2 suspect=$3
     "$meshmark" verify --key key.json --reference "$reference" "${@:4}" "$suspect" >"$work/verify.log" 2>&1 ||
         fail "$what: $suspect does not verify: $(cat "$work/verify.log")"
-    # Half of the signs agree by chance, and rigid bodies show some of them weakly.
-    awk '/^signs:/ && $8 == "recipient" { ok = $9 > 0.65 * $3 } END { exit !ok }' "$work/verify.log" ||
+    # Stiff shapes show many of the signs weakly, how many depends on the key: "of 3136 secret signs of the
+    # recipient 1961 agree; by chance 1568 ± 28 would" is far from chance all the same.
+    awk '/^signs:/ && $8 == "recipient" { ok = $9 - $13 > 10 * $15 } END { exit !ok }' "$work/verify.log" ||
         fail "$what: signs of $suspect are wrong: $(cat "$work/verify.log")"
     passed "$what: $suspect verifies against $reference"
 }
