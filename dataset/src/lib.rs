@@ -43,4 +43,4 @@ pub use geos::GeosOfGdal;
 pub use key_file::exposure;
 pub use selection::{LabelFields, MOST_VERTICES, OPEN_OPTIONS, Selection};
 pub use survey::{Numbers, Survey, numbers, survey};
-pub use threads::{ThreadPool, threads};
+pub use threads::threads;

@@ -20,6 +20,7 @@ pub mod left_out;
 mod moves;
 pub mod quality;
 mod records;
+mod thread_pool;
 pub mod wkb;
 
 pub use chains::Chains;
@@ -32,3 +33,4 @@ pub use geometries::{Geometries, Outline};
 pub use left_out::{Faults, LeftOut};
 pub use moves::{Moves, NotMoved};
 pub use records::{Lineage, Unmarked, fingerprint_record, recorded, reference};
+pub use thread_pool::ThreadPool;

@@ -31,9 +31,9 @@ use copies::MarkedCopy;
 use marks::Marks;
 use meshmark_core::options::Spelling;
 use meshmark_dataset::{
-    Bases, GeosOfGdal, Survey, ThreadPool, file_digest, formats::Format, threads, workplace::Workplace,
+    Bases, GeosOfGdal, Survey, file_digest, formats::Format, threads, workplace::Workplace,
 };
-use meshmark_marking::{self as marking, Lineage, Unmarked};
+use meshmark_marking::{self as marking, Lineage, ThreadPool, Unmarked};
 use staging::Stage;
 use std::{
     fs,
