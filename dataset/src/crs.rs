@@ -179,9 +179,10 @@ pub fn as_crs(crs: &Option<CoordinateSystem>) -> Option<&dyn Crs> {
 /// Parses a CRS given by the user: EPSG:…, WKT, PROJ.
 ///
 /// # Errors
-/// [`Error::UnknownSrs`].
+/// [`meshmark_marking::Error::UnknownSrs`].
 pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
-    let srs = SpatialRef::from_definition(text).map_err(|_| Error::UnknownSrs(text.into()))?;
+    let srs =
+        SpatialRef::from_definition(text).map_err(|_| meshmark_marking::Error::UnknownSrs(text.into()))?;
     Ok(CoordinateSystem::new(srs))
 }
 

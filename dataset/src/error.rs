@@ -12,8 +12,6 @@ use std::{
 pub enum Error {
     NoLayers,
     UnknownLayer { name: String, known: String },
-    ContradictingSrs { crs: String, srs: String },
-    UnknownSrs(String),
     Unreadable { layer: String, reason: String },
     Reprojection { layer: String, source: GdalError },
     FewPlaces { layer: String, crs: String },
@@ -118,7 +116,10 @@ impl From<meshmark_core::Error> for Error {
 impl Error {
     /// Returns whether a map lacks the layers or the CRS that options give it.
     pub fn is_of_other_layers(&self) -> bool {
-        matches!(self, Error::UnknownLayer { .. } | Error::ContradictingSrs { .. })
+        matches!(
+            self,
+            Error::UnknownLayer { .. } | Error::Map(meshmark_marking::Error::ContradictingSrs { .. })
+        )
     }
 
     /// Returns whether bases do not belong to a map, to its key or to each other.
@@ -139,20 +140,11 @@ impl Error {
 
     /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
-        let srs = |crs: &str| spelling.value("SRS", crs);
         let base = |path: &Path| spelling.value("BASE", path.display());
         match self {
             Error::NoLayers => "the map has no vector layer: give a vector dataset that GDAL can open".into(),
             Error::UnknownLayer { name, known } => {
                 format!("the map has no layer \"{name}\": {} may name {known}", spelling.name("LAYERS"))
-            }
-            Error::ContradictingSrs { crs, srs: given } => format!(
-                "the map has a CRS of its own ({crs}), and {} is another one: leave {} out",
-                srs(given),
-                spelling.name("SRS")
-            ),
-            Error::UnknownSrs(text) => {
-                format!("{} is not a CRS that PROJ knows: use for example EPSG:3067", srs(text))
             }
             Error::Unreadable { layer, reason } => {
                 format!("layer \"{layer}\" cannot be read to its end: {reason}")

@@ -309,7 +309,7 @@ impl<'a> Walk<'a> {
         let crs = |own: Option<CoordinateSystem>| match (own, &given) {
             (Some(own), Some(given)) if !own.is_same(given) => {
                 let [crs, srs] = own.names_apart(given);
-                Err(Error::ContradictingSrs { crs, srs })
+                Err(marking::Error::ContradictingSrs { crs, srs }.into())
             }
             (Some(own), _) => Ok(Some(own)),
             (None, given) => Ok(given.clone()),

@@ -9,6 +9,8 @@ use std::fmt;
 pub enum Error {
     MixedCrs { first: String, first_crs: String, second: String, second_crs: String },
     NoCrs,
+    ContradictingSrs { crs: String, srs: String },
+    UnknownSrs(String),
     Geocentric(String),
     NotFinite { layer: String, fid: String, x: f64, y: f64 },
     TooFar { layer: String, fid: String, x: f64, y: f64 },
@@ -58,6 +60,7 @@ impl Error {
     pub fn is_about_options(&self) -> bool {
         match self {
             Error::MixedCrs { .. } | Error::NoCrs | Error::Geocentric(_) | Error::Core(_) => true,
+            Error::ContradictingSrs { .. } | Error::UnknownSrs(_) => true,
             Error::TooSmall { .. } | Error::UnevenScale { .. } => true,
             Error::NotFinite { .. } | Error::TooFar { .. } | Error::Geometry { .. } => false,
             Error::TooLarge { .. } => false,
@@ -90,6 +93,17 @@ impl Error {
                 "the map has no CRS and all its coordinates could be degrees: say which CRS it is, for example {}",
                 spelling.value("SRS", "EPSG:4326")
             ),
+            Error::ContradictingSrs { crs, srs } => format!(
+                "the map has a CRS of its own ({crs}), and {} is another one: leave {} out",
+                spelling.value("SRS", srs),
+                spelling.name("SRS")
+            ),
+            Error::UnknownSrs(text) => {
+                format!(
+                    "{} is not a CRS that PROJ knows: use for example EPSG:3067",
+                    spelling.value("SRS", text)
+                )
+            }
             Error::Geocentric(crs) => {
                 format!(
                     "the CRS {crs} is geocentric, and a map needs a projected or geographic one: reproject first"

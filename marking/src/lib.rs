@@ -1,5 +1,5 @@
 //! Features as well-known binary become a map, and the map's vertices move them. This crate holds what
-//! every front end that marks has in common, and uses no files and no GDAL: a front end brings its
+//! every front end that marks has in common, and opens no files and uses no GDAL: a front end brings its
 //! CRS ([`Crs`]) and its GEOS ([`quality::Geos`]).
 //!
 //! ```text
@@ -16,6 +16,8 @@ mod damage;
 mod error;
 mod extent;
 mod geometries;
+#[cfg(unix)]
+mod key_file;
 pub mod left_out;
 mod moves;
 pub mod quality;
@@ -30,6 +32,8 @@ pub use damage::damage_warning;
 pub use error::{Error, Result};
 pub use extent::Extent;
 pub use geometries::{Geometries, Outline};
+#[cfg(unix)]
+pub use key_file::exposure;
 pub use left_out::{Faults, LeftOut};
 pub use moves::{Moves, NotMoved};
 pub use records::{Lineage, Unmarked, fingerprint_record, recorded, reference};

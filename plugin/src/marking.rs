@@ -21,10 +21,10 @@ use meshmark_core::{
 use meshmark_dataset::{
     Bases, GeosOfGdal, LabelFields, MOST_VERTICES, Selection, Survey,
     decimals::Digits,
-    exposure, same_file, survey,
+    same_file, survey,
     traces::{self, ForeignMembers},
 };
-use meshmark_marking::{self as marking, Lineage, Moves, ThreadPool, Unmarked, damage_warning};
+use meshmark_marking::{self as marking, Lineage, Moves, ThreadPool, Unmarked, damage_warning, exposure};
 use std::{fs::File, path::Path};
 
 /// The noise that the estimates from a file that was read back assume, metres.

@@ -1,5 +1,7 @@
 """The CRS of a layer, as the extension takes it."""
 
+import math
+
 import pyproj
 
 
@@ -28,6 +30,8 @@ class Crs:
 
     def to_geographic(self, x, y):
         """Return longitudes and latitudes on the datum of the CRS; inf where there is no place."""
+        if self.label == "EPSG:3857":
+            return _of_web_mercator(x, y)
         if self._transformer is None:
             geodetic = self.crs.geodetic_crs
             self._transformer = pyproj.Transformer.from_crs(self.crs, geodetic, always_xy=True)
@@ -40,6 +44,16 @@ def _kind(crs):
     if crs.is_geographic:
         return "geographic"
     return "projected" if crs.is_projected else "other"
+
+
+def _of_web_mercator(x, y):
+    """Return what GDAL's driver computes, which does not leave this projection to PROJ."""
+    per_metre, degrees = 1.0 / 6378137.0, 180.0 / math.pi
+
+    def latitude(y):
+        return (math.pi / 2 - 2 * math.atan(math.exp(min(-y * per_metre, 700.0)))) * degrees
+
+    return [x * per_metre * degrees for x in x], [latitude(y) for y in y]
 
 
 def _unit(crs):

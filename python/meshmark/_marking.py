@@ -2,7 +2,10 @@
 
 import warnings
 
+import pyproj
+
 from . import _frames, _geos, _meshmark
+from ._crs import Crs
 
 # The options of the driver that shape a mark.
 OPTIONS = (
@@ -17,7 +20,7 @@ OPTIONS = (
 )
 
 
-def mark(layers, key, *, recipient=None, message=None, threads=None, progress=None, **options):
+def mark(layers, key, *, recipient=None, message=None, srs=None, threads=None, progress=None, **options):
     """Mark a map.
 
     Parameters
@@ -30,6 +33,8 @@ def mark(layers, key, *, recipient=None, message=None, threads=None, progress=No
         The recipient of the copy, whose fingerprint it gets.
     message : str, optional
         A message instead, hexadecimal.
+    srs : str, optional
+        The CRS of layers that have none, such as "EPSG:3067".
     threads : int, optional
         The number of threads; all processors by default. It changes no result.
     progress : callable, optional
@@ -54,7 +59,7 @@ def mark(layers, key, *, recipient=None, message=None, threads=None, progress=No
         When an option has a value that is not legal.
     """
     frames = _as_dict(layers)
-    given = {"recipient": recipient, "message": message, **options}
+    given = {"recipient": recipient, "message": message, "srs": srs, **options}
     unknown = sorted(set(options) - set(OPTIONS))
     if unknown:
         raise TypeError(f"mark() has no option {unknown[0]}: use {', '.join(OPTIONS)}")
@@ -64,12 +69,24 @@ def mark(layers, key, *, recipient=None, message=None, threads=None, progress=No
         raise ValueError(f"threads={threads} is not a whole number from 1 to 256")
     pairs = [(name.upper(), str(value)) for name, value in given.items() if value is not None]
     moved, record, texts = _meshmark.mark(
-        _frames.layers_of(frames), key, pairs, _geos, threads=threads, progress=progress
+        _frames.layers_of(frames),
+        key,
+        pairs,
+        _geos,
+        {"srs": srs and _crs_of(srs), "threads": threads, "progress": progress},
     )
     for text in texts:
         warnings.warn(text, stacklevel=2)
     copies = _frames.moved(frames, moved)
     return (copies if isinstance(layers, dict) else copies["layer"]), record
+
+
+def _crs_of(srs):
+    try:
+        return Crs(srs)
+    except pyproj.exceptions.CRSError:
+        text = f"srs={srs} is not a CRS that PROJ knows: use for example EPSG:3067"
+        raise _meshmark.OptionError(text) from None
 
 
 def _as_dict(layers):

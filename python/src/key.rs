@@ -2,7 +2,10 @@
 
 use crate::errors::KeyFileError;
 use meshmark_core::key::{SecretKey, read_text};
-use pyo3::{exceptions::PyOSError, prelude::*};
+use pyo3::{
+    exceptions::{PyOSError, PyUserWarning},
+    prelude::*,
+};
 use std::{
     fs::File,
     io::{self, Write},
@@ -25,8 +28,10 @@ impl Key {
 
     /// Read a key file, that of `meshmark keygen` or of `write`.
     #[staticmethod]
-    fn read(path: PathBuf) -> PyResult<Self> {
-        let text = File::open(&path).and_then(read_text).map_err(|error| of_file(&path, error))?;
+    fn read(py: Python, path: PathBuf) -> PyResult<Self> {
+        let file = File::open(&path).map_err(|error| of_file(&path, error))?;
+        warn_if_exposed(py, &path, &file)?;
+        let text = read_text(file).map_err(|error| of_file(&path, error))?;
         let key = SecretKey::from_json(&text);
         key.map(Key).map_err(|error| KeyFileError::new_err(format!("{}: {error}", path.display())))
     }
@@ -54,6 +59,18 @@ impl Key {
     fn __repr__(&self) -> String {
         format!("<meshmark.Key {}>", self.0.id())
     }
+}
+
+/// Warns of a key file that others can read.
+fn warn_if_exposed(py: Python, path: &Path, file: &File) -> PyResult<()> {
+    #[cfg(unix)]
+    if let Some(text) = meshmark_marking::exposure(path, file) {
+        let text = std::ffi::CString::new(text).expect("a path has no null character");
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    #[cfg(not(unix))]
+    let _ = (py, path, file);
+    Ok(())
 }
 
 /// Returns the exception of a file, of the class that Python has for it.

@@ -104,6 +104,22 @@ impl Layer {
     }
 }
 
+/// Gives layers without a CRS that of the option `srs`.
+pub fn assign_crs(py: Python, layers: &mut [Layer], srs: &Bound<PyAny>) -> PyResult<marking::Result<()>> {
+    for layer in layers {
+        let given: PyCrs = srs.extract()?;
+        match &layer.crs {
+            Some(own) if !own.is_same(py, &given)? => {
+                let (crs, srs) = (own.brief_name(), given.brief_name());
+                return Ok(Err(marking::Error::ContradictingSrs { crs, srs }));
+            }
+            Some(_) => {}
+            None => layer.crs = Some(given),
+        }
+    }
+    Ok(Ok(()))
+}
+
 /// Returns the error of layers with geometries whose CRS differ, as one mesh needs one.
 fn mixed_crs(py: Python, layers: &[Layer]) -> PyResult<Option<marking::Error>> {
     let mut layers = layers.iter().filter(|layer| layer.has_any());

@@ -4,7 +4,7 @@ use crate::{
     errors::{of_map, of_options},
     geos::PyGeos,
     key::Key,
-    layer::{Layer, LayeredMap},
+    layer::{Layer, LayeredMap, assign_crs},
     record::Record,
     waiting::{Job, run},
 };
@@ -24,20 +24,35 @@ use std::thread::available_parallelism;
 /// A marked map: the geometries of each layer, the record, and warnings.
 type MarkedLayers = (Vec<Vec<Option<Vec<u8>>>>, Record, Vec<String>);
 
+/// Marked layers for Python.
+type PyMarkedLayers<'py> = (Vec<Vec<Option<Bound<'py, PyBytes>>>>, Record, Vec<String>);
+
+/// What does not shape the mark, a dict.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings<'py> {
+    /// The CRS of layers without one.
+    srs: Option<Bound<'py, PyAny>>,
+    threads: Option<usize>,
+    progress: Option<Bound<'py, PyAny>>,
+}
+
 /// Mark layers with the options NAME, value; `geos` is the package's module `_geos`.
 #[pyfunction]
-#[pyo3(signature = (layers, key, options, geos, *, threads, progress))]
 pub fn mark<'py>(
     py: Python<'py>,
-    layers: Vec<Layer>,
+    mut layers: Vec<Layer>,
     key: &Key,
     options: Vec<(String, String)>,
     geos: Py<PyModule>,
-    threads: Option<usize>,
-    progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(Vec<Vec<Option<Bound<'py, PyBytes>>>>, Record, Vec<String>)> {
+    settings: Settings<'py>,
+) -> PyResult<PyMarkedLayers<'py>> {
+    let Settings { srs, threads, progress } = settings;
     let pairs = options.iter().map(|(name, value)| (name.as_str(), value.as_str()));
     let options = Options::parse(pairs).map_err(of_options)?;
+    if let Some(srs) = srs {
+        assign_crs(py, &mut layers, &srs)?.map_err(of_map)?;
+    }
     let map = LayeredMap::read(py, &layers)?.map_err(of_map)?;
     let threads = threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
     let (layers, geos) = (&layers[..], &PyGeos(geos));

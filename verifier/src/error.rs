@@ -315,11 +315,7 @@ impl Error {
         use MapError::*;
         let Error::Map { source, .. } = self else { return false };
         match &**source {
-            NoLayers
-            | UnknownLayer { .. }
-            | ContradictingSrs { .. }
-            | UnknownSrs(_)
-            | Reprojection { .. } => true,
+            NoLayers | UnknownLayer { .. } | Reprojection { .. } => true,
             Map(fault) => fault.is_about_options(),
             _ => false,
         }
@@ -375,7 +371,8 @@ impl Error {
 fn of_map_that_is_read(error: &MapError) -> ExitCode {
     match error {
         MapError::Map(marking::Error::TooLarge { .. }) => ExitCode::TooLarge,
-        MapError::UnknownLayer { .. } | MapError::UnknownSrs(_) | MapError::ContradictingSrs { .. } => {
+        MapError::UnknownLayer { .. }
+        | MapError::Map(marking::Error::UnknownSrs(_) | marking::Error::ContradictingSrs { .. }) => {
             ExitCode::Usage
         }
         _ => ExitCode::Unreadable,
