@@ -13,7 +13,7 @@ CARGO_TARGET_DIR=$out/build PATH=$PWD/$out/tools/bin:$PATH "$out/tools/bin/matur
     --zig --compatibility manylinux2014 --manifest-path python/Cargo.toml --out "$out/wheels"
 
 "$python" -m venv "$out/clean"
-"$out/clean/bin/python" -m pip install --quiet "$out"/wheels/*.whl geopandas pyogrio
+"$out/clean/bin/python" -m pip install --quiet "$out"/wheels/*.whl geopandas pyogrio pyarrow
 if ldd "$out"/clean/lib/python*/site-packages/meshmark/_meshmark*.so | grep -E 'gdal|geos|proj|sqlite'; then
     echo "the wheel needs a library that a user may lack" >&2
     exit 1

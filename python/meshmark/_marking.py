@@ -4,8 +4,9 @@ import warnings
 
 import pyproj
 
-from . import _frames, _geos, _meshmark
+from . import _geos, _meshmark
 from ._crs import Crs
+from ._layers import source
 
 # The options of the driver that shape a mark.
 OPTIONS = (
@@ -20,13 +21,14 @@ OPTIONS = (
 )
 
 
-def mark(layers, key, *, recipient=None, message=None, srs=None, threads=None, progress=None, **options):
+def mark(layers, key, *, recipient=None, message=None, srs=None, geometry=None, threads=None, progress=None, **options):
     """Mark a map.
 
     Parameters
     ----------
-    layers : geopandas.GeoDataFrame or dict of str to GeoDataFrame
-        The map; several layers share one mesh, and one CRS.
+    layers : geopandas.GeoDataFrame, array of shapely's geometries, table, or dict of str to these
+        The map; several layers share one mesh, and one CRS. A table is any object with the Arrow
+        interface, whose geometry columns are well-known binary.
     key : Key
         The secret key.
     recipient : str, optional
@@ -35,6 +37,8 @@ def mark(layers, key, *, recipient=None, message=None, srs=None, threads=None, p
         A message instead, hexadecimal.
     srs : str, optional
         The CRS of layers that have none, such as "EPSG:3067".
+    geometry : str, optional
+        The geometry column of tables whose metadata name none.
     threads : int, optional
         The number of threads; all processors by default. It changes no result.
     progress : callable, optional
@@ -46,8 +50,8 @@ def mark(layers, key, *, recipient=None, message=None, srs=None, threads=None, p
 
     Returns
     -------
-    layers : geopandas.GeoDataFrame or dict of str to GeoDataFrame
-        A marked copy; what was given is unchanged.
+    layers : what was given
+        A marked copy; what was given is unchanged. Tables become tables of pyarrow.
     record : Record
         The record, which an auditor needs besides the key and the unmarked map.
 
@@ -58,8 +62,6 @@ def mark(layers, key, *, recipient=None, message=None, srs=None, threads=None, p
     OptionError
         When an option has a value that is not legal.
     """
-    frames = _as_dict(layers)
-    given = {"recipient": recipient, "message": message, "srs": srs, **options}
     unknown = sorted(set(options) - set(OPTIONS))
     if unknown:
         raise TypeError(f"mark() has no option {unknown[0]}: use {', '.join(OPTIONS)}")
@@ -67,17 +69,17 @@ def mark(layers, key, *, recipient=None, message=None, srs=None, threads=None, p
         raise TypeError("mark() needs a recipient or a message, and not both")
     if threads is not None and not 1 <= threads <= 256:
         raise ValueError(f"threads={threads} is not a whole number from 1 to 256")
-    pairs = [(name.upper(), str(value)) for name, value in given.items() if value is not None]
-    moved, record, texts = _meshmark.mark(
-        _frames.layers_of(frames),
-        key,
-        pairs,
-        _geos,
-        {"srs": srs and _crs_of(srs), "threads": threads, "progress": progress},
-    )
+    texts = {"recipient": recipient, "message": message, "srs": srs, **options}
+    pairs = [(name.upper(), str(value)) for name, value in texts.items() if value is not None]
+    given = layers if isinstance(layers, dict) else {"layer": layers}
+    sources = {name: source(name, layer, geometry) for name, layer in given.items()}
+    columns = [column for layer in sources.values() for column in layer.columns]
+    settings = {"srs": srs and _crs_of(srs), "threads": threads, "progress": progress}
+    moved, record, texts = _meshmark.mark(columns, key, pairs, _geos, settings)
     for text in texts:
         warnings.warn(text, stacklevel=2)
-    copies = _frames.moved(frames, moved)
+    moved = iter(moved)
+    copies = {name: layer.moved([next(moved) for _ in layer.columns]) for name, layer in sources.items()}
     return (copies if isinstance(layers, dict) else copies["layer"]), record
 
 
@@ -87,14 +89,3 @@ def _crs_of(srs):
     except pyproj.exceptions.CRSError:
         text = f"srs={srs} is not a CRS that PROJ knows: use for example EPSG:3067"
         raise _meshmark.OptionError(text) from None
-
-
-def _as_dict(layers):
-    frames = layers if isinstance(layers, dict) else {"layer": layers}
-    for name, frame in frames.items():
-        if not hasattr(frame, "geometry") or not hasattr(frame, "crs"):
-            raise TypeError(
-                f"layer {name!r} is a {type(frame).__name__}, and not a GeoDataFrame: make one with "
-                "geopandas.GeoDataFrame(..., geometry=..., crs=...)"
-            )
-    return frames

@@ -5,7 +5,7 @@ use meshmark_core::map_data::MapData;
 use meshmark_marking::{self as marking, Chains, Crs, Extent, Faults, Geometries, Metric, Moves, NotMoved};
 use pyo3::{prelude::*, pybacked::PyBackedBytes};
 
-/// A geometry column of a layer; the package's class `_frames.Layer`.
+/// A geometry column of a layer; the package's class `_layers.Column`.
 pub struct Layer {
     object: Py<PyAny>,
     name: String,

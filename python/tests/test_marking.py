@@ -115,6 +115,15 @@ class Frames(Folder):
         self.assertTrue(copy.geometry[8].is_empty)
         self.assertEqual(len(copy), len(frame))
 
+    def test_series_and_arrays_are_marked_like_frames(self):
+        frame = town()
+        meant, _ = self.mark(frame)
+        series, _ = self.mark(frame.geometry)
+        array, _ = self.mark(frame.geometry.to_numpy().reshape(20, 20), srs="EPSG:3067")
+        self.assertTrue((series.to_wkb() == meant.geometry.to_wkb()).all())
+        self.assertEqual((series.crs, series.name, array.shape), (frame.crs, "geometry", (20, 20)))
+        self.assertTrue((shapely.to_wkb(array.ravel()) == meant.geometry.to_wkb()).all())
+
     def test_layers_without_a_crs_get_the_given_one(self):
         copy, record = self.mark(town(crs=None), srs="EPSG:3067")
         self.assertEqual((copy.crs, '"crs": "EPSG:3067"' in record.to_json()), (None, True))
@@ -174,7 +183,7 @@ class Refused(Folder):
         )
         self.refused(meshmark.MapError, "vertices", frame[:3])
         self.refused(meshmark.MapError, "vertices", frame[:0])
-        self.refused(TypeError, "GeoDataFrame", frame.drop(columns="geometry"))
+        self.refused(TypeError, "no column.*GeoDataFrame", frame.drop(columns="geometry"))
         self.refused(TypeError, "GeoDataFrame", [frame])
         self.refused(TypeError, "GeoDataFrame", {"a": 1})
         self.refused(meshmark.MapError, "geocentric", town(crs="EPSG:4978"))
