@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz fuzz-build sanitizers \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz fuzz-build sanitizers wheel \
 	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
@@ -134,6 +134,11 @@ $(WHEEL_PYTHON):
 	./install-deps.sh python3-venv curl
 	python3 -m venv target/wheel/python
 	$@ -m pip install --quiet pyogrio==0.13.0 geopandas==1.1.1
+
+# The Python wheel, and its tests in a clean environment; PYTHON= names another Python.
+wheel: build
+	./install-deps.sh python3-venv
+	python/make_wheel.sh "$(or $(PYTHON),python3)" target/python
 
 deb: build
 	./install-deps.sh dpkg-dev

@@ -11,6 +11,7 @@ use meshmark_core::{
     recorded::Recorded,
     series::Series,
 };
+use meshmark_marking::Crs;
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},

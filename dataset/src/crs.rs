@@ -1,17 +1,12 @@
 //! Coordinate reference systems: metres per unit, labels, and the traditional axis order
 //! everywhere.
 
-use crate::{
-    Error, Result, crs_wkt as wkt,
+use crate::{Error, Result, crs_wkt as wkt};
+use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
+use meshmark_marking::{
+    Crs, CrsKind,
     left_out::{MISSING, is_there},
 };
-use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
-use meshmark_core::{
-    ground::Ground,
-    scale::{Scale, ScaleLattice},
-    vertices::VertexTable,
-};
-use std::sync::Arc;
 
 /// The furthest coordinates that mean a place, in turns around the Earth: maps continue past the date
 /// line, and eastings may begin with the number of their zone.
@@ -53,17 +48,12 @@ impl CoordinateSystem {
         &self.0
     }
 
-    /// Returns the code, such as "EPSG:3067", or WKT without one.
-    pub fn label(&self) -> String {
-        self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
-    }
-
-    /// Returns the name for messages: the code, such as "EPSG:3067", or the name of a CRS without
-    /// one.
-    pub fn brief_name(&self) -> String {
-        let name = || self.0.name().filter(|name| !NO_NAMES.iter().any(|no| no.eq_ignore_ascii_case(name)));
-        let or_name = self.0.authority().ok().or_else(name);
-        or_name.or_else(|| self.0.to_proj4().ok()).unwrap_or_else(|| "unknown CRS".into())
+    /// Returns the geographic CRS that it is or is a projection of.
+    fn geographic(&self) -> Option<CoordinateSystem> {
+        match self.0.is_geographic() {
+            true => Some(self.clone()),
+            false => self.0.geog_cs().ok().map(CoordinateSystem::new),
+        }
     }
 
     /// Returns the names of two different CRS for messages: brief names, with their definitions
@@ -137,137 +127,63 @@ impl CoordinateSystem {
         };
         places.into_iter().map(place).collect()
     }
-
-    /// Measures the ground at many places of a map for which `ground` is not exact everywhere.
-    pub(crate) fn uneven(&self, table: &VertexTable, ground: &Ground) -> Option<Ground> {
-        let Ground::Plane { metres_per_unit } = *ground else { return None };
-        let local = Local::new(self)?;
-        let lattice =
-            ScaleLattice::measure(table, metres_per_unit, NEGLIGIBLE, |places| local.scales(places));
-        lattice.map(|lattice| Ground::Uneven(Arc::new(lattice)))
-    }
-
-    fn ground(&self, table: &VertexTable) -> Result<Ground> {
-        if self.0.is_geocentric() {
-            return Err(Error::Geocentric(self.brief_name()));
-        }
-        if self.0.is_geographic() {
-            return Ok(self.ellipsoid(&self.0)?);
-        }
-        let metres_per_unit = match self.measured_metres_per_unit(table.centre()) {
-            Some(measured) => measured,
-            None => self.0.linear_units(), // an engineering CRS, or a place outside the projection
-        };
-        Ok(Ground::Plane { metres_per_unit })
-    }
-
-    fn ellipsoid(&self, geographic: &SpatialRef) -> gdal::errors::Result<Ground> {
-        Ok(Ground::Ellipsoid {
-            semi_major_m: geographic.semi_major()?,
-            semi_minor_m: geographic.semi_minor()?,
-            radians_per_unit: geographic.angular_units(),
-        })
-    }
-
-    /// Measures metres per unit at a place, the square root of the areal scale, by differences of
-    /// 100 units of length in longitude and latitude. An EPSG:3857 unit is half a metre at
-    /// Helsinki.
-    fn measured_metres_per_unit(&self, place: [f64; 2]) -> Option<f64> {
-        let local = Local::new(self)?;
-        let [lon, lat] = local.around(&[place]);
-        let [m_lon, m_lat] = local.ellipsoid.metres_per_unit([lon[4], lat[4]]);
-        let side = |a: usize, b: usize| [(lon[b] - lon[a]) * m_lon, (lat[b] - lat[a]) * m_lat];
-        let (along_x, along_y) = (side(0, 1), side(2, 3));
-        let area = (along_x[0] * along_y[1] - along_x[1] * along_y[0]).abs();
-        let measured = area.sqrt() / (2.0 * local.step);
-        let measured = (measured.is_finite() && measured > 0.0).then_some(measured)?;
-        // Across the 180th meridian and near a pole, differences of longitudes are not lengths.
-        let in_space = local.scales(&[place]).pop().flatten().map(|scale| {
-            let [least, largest] = scale.extremes;
-            (least * largest).sqrt()
-        });
-        Some(
-            in_space
-                .filter(|true_scale| (measured / true_scale - 1.0).abs() > NEGLIGIBLE)
-                .unwrap_or(measured),
-        )
-    }
 }
 
-/// An error of the scale below this share is negligible.
-const NEGLIGIBLE: f64 = 1e-3;
-
-/// The scales of a projected CRS, measured by differences of 100 metres.
-struct Local {
-    to_geographic: CoordTransform,
-    ellipsoid: Ground,
-    /// Half a difference, CRS units.
-    step: f64,
-}
-
-impl Local {
-    fn new(crs: &CoordinateSystem) -> Option<Self> {
-        if !crs.0.is_projected() {
-            return None;
-        }
-        let geographic = CoordinateSystem::new(crs.0.geog_cs().ok()?);
-        let to_geographic = crs.transform_to(&geographic).ok()?;
-        let ellipsoid = crs.ellipsoid(&geographic.0).ok()?;
-        Some(Local { to_geographic, ellipsoid, step: 50.0 / crs.0.linear_units() })
+impl Crs for CoordinateSystem {
+    fn kind(&self) -> CrsKind {
+        let kinds = [
+            (self.0.is_geocentric(), CrsKind::Geocentric),
+            (self.0.is_geographic(), CrsKind::Geographic),
+            (self.0.is_projected(), CrsKind::Projected),
+        ];
+        kinds.into_iter().find(|(is, _)| *is).map_or(CrsKind::Other, |(_, kind)| kind)
     }
 
-    /// Returns longitudes and latitudes of the points left, right, below and above each place, and
-    /// of the place itself; they are not finite where the projection has no such place.
-    fn around(&self, places: &[[f64; 2]]) -> [Vec<f64>; 2] {
-        let s = self.step;
-        let around =
-            places.iter().flat_map(|[x, y]| [[x - s, *y], [x + s, *y], [*x, y - s], [*x, y + s], [*x, *y]]);
-        let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = around.map(|[x, y]| (x, y)).unzip();
+    fn label(&self) -> String {
+        self.0.authority().or_else(|_| self.0.to_wkt()).unwrap_or_else(|_| "unknown CRS".into())
+    }
+
+    fn brief_name(&self) -> String {
+        let name = || self.0.name().filter(|name| !NO_NAMES.iter().any(|no| no.eq_ignore_ascii_case(name)));
+        let or_name = self.0.authority().ok().or_else(name);
+        or_name.or_else(|| self.0.to_proj4().ok()).unwrap_or_else(|| "unknown CRS".into())
+    }
+
+    fn linear_units_m(&self) -> f64 {
+        self.0.linear_units()
+    }
+
+    fn radians_per_unit(&self) -> f64 {
+        self.geographic().map_or(self.0.angular_units(), |geographic| geographic.0.angular_units())
+    }
+
+    fn ellipsoid_m(&self) -> Option<[f64; 2]> {
+        let geographic = self.geographic()?;
+        Some([geographic.0.semi_major().ok()?, geographic.0.semi_minor().ok()?])
+    }
+
+    fn to_geographic(&self, x: &mut [f64], y: &mut [f64]) -> bool {
+        let transform = self.geographic().and_then(|geographic| self.transform_to(&geographic).ok());
+        let Some(transform) = transform else { return false };
         // An error concerns some points only, which are then not finite.
-        let _ = self.to_geographic.transform_coords(&mut lon, &mut lat, &mut []);
-        [lon, lat]
-    }
-
-    fn scales(&self, places: &[[f64; 2]]) -> Vec<Option<Scale>> {
-        let [lon, lat] = self.around(places);
-        let scale = |(lon, lat): (&[f64], &[f64])| {
-            let in_space = |i: usize| self.ellipsoid.in_space([lon[i], lat[i]]);
-            let unit = |a: usize, b: usize| {
-                let (from, to) = (in_space(a)?, in_space(b)?);
-                Some([0, 1, 2].map(|axis| (to[axis] - from[axis]) / (2.0 * self.step)))
-            };
-            let scale = Scale::new(unit(0, 1)?, unit(2, 3)?);
-            let [least, largest] = scale.extremes;
-            (least > 0.0 && largest.is_finite()).then_some(scale)
-        };
-        lon.chunks(POINTS).zip(lat.chunks(POINTS)).map(scale).collect()
+        let _ = transform.transform_coords(x, y, &mut []);
+        true
     }
 }
 
-/// Number of points around a place, itself included.
-const POINTS: usize = 5;
+/// Returns the CRS of a map as marking takes it.
+pub fn as_crs(crs: &Option<CoordinateSystem>) -> Option<&dyn Crs> {
+    crs.as_ref().map(|crs| crs as &dyn Crs)
+}
 
 /// Parses a CRS given by the user: EPSG:…, WKT, PROJ.
 ///
 /// # Errors
-/// [`Error::UnknownSrs`].
+/// [`meshmark_marking::Error::UnknownSrs`].
 pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
-    let srs = SpatialRef::from_definition(text).map_err(|_| Error::UnknownSrs(text.into()))?;
+    let srs =
+        SpatialRef::from_definition(text).map_err(|_| meshmark_marking::Error::UnknownSrs(text.into()))?;
     Ok(CoordinateSystem::new(srs))
-}
-
-/// Returns metres on the ground for a map, by its CRS; without one a unit is a metre, unless every
-/// coordinate could be a degree.
-pub(crate) fn ground(crs: Option<&CoordinateSystem>, table: &VertexTable) -> Result<Ground> {
-    if let Some(crs) = crs {
-        return crs.ground(table);
-    }
-    let (min, max) = table.bounds();
-    let degrees = min[0] >= -180.0 && max[0] <= 180.0 && min[1] >= -90.0 && max[1] <= 90.0;
-    if degrees && !table.is_empty() {
-        return Err(Error::NoCrs);
-    }
-    Ok(Ground::METRES)
 }
 
 /// Reprojects coordinates into `target`; those of a layer without a CRS are assumed to be in it.
@@ -292,6 +208,8 @@ pub(crate) fn reproject(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use meshmark_core::{ground::Ground, vertices::VertexTable};
+    use meshmark_marking::{Error, ground};
 
     fn metres_per_unit(srs: &str, at: [f64; 2]) -> [f64; 2] {
         let table = VertexTable::new(vec![at]).unwrap();

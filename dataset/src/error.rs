@@ -1,4 +1,4 @@
-use crate::{read_back::Difference, wkb::GeometryFault};
+use crate::read_back::Difference;
 use gdal::errors::GdalError;
 use meshmark_core::options::Spelling;
 use std::{
@@ -12,21 +12,10 @@ use std::{
 pub enum Error {
     NoLayers,
     UnknownLayer { name: String, known: String },
-    MixedCrs { first: String, first_crs: String, second: String, second_crs: String },
-    NoCrs,
-    ContradictingSrs { crs: String, srs: String },
-    UnknownSrs(String),
-    Geocentric(String),
-    NotFinite { layer: String, fid: String, x: f64, y: f64 },
-    TooFar { layer: String, fid: String, x: f64, y: f64 },
-    Geometry { layer: String, fid: String, source: GeometryFault },
     Unreadable { layer: String, reason: String },
     Reprojection { layer: String, source: GdalError },
     FewPlaces { layer: String, crs: String },
-    TooLarge { most: usize },
-    TooSmall { size_m: f64, tolerance_m: f64 },
     Traces(Vec<String>),
-    UnevenScale { ends: [[f64; 2]; 2], off_percent: f64, crs: String },
     UnknownFormat { named: Option<String>, extension: Option<String>, known: String },
     OneLayer { driver: &'static str },
     NotWgs84 { driver: &'static str, layer: String },
@@ -51,7 +40,7 @@ pub enum Error {
     OtherBase { base: String },
     BaseReferenceUnread { path: PathBuf, reason: String },
     Gdal(GdalError),
-    Core(meshmark_core::Error),
+    Map(meshmark_marking::Error),
 }
 
 /// The result of every fallible function of this crate.
@@ -96,12 +85,11 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            Error::Geometry { source, .. } => Some(source),
             Error::Reprojection { source, .. } => Some(source),
             Error::File { source, .. } | Error::BaseUnread { source, .. } => Some(source),
             Error::BaseMalformed { source, .. } => Some(source),
             Error::Gdal(source) => Some(source),
-            Error::Core(source) => Some(source),
+            Error::Map(source) => Some(source),
             _ => None,
         }
     }
@@ -113,16 +101,25 @@ impl From<GdalError> for Error {
     }
 }
 
+impl From<meshmark_marking::Error> for Error {
+    fn from(error: meshmark_marking::Error) -> Self {
+        Error::Map(error)
+    }
+}
+
 impl From<meshmark_core::Error> for Error {
     fn from(error: meshmark_core::Error) -> Self {
-        Error::Core(error)
+        Error::Map(error.into())
     }
 }
 
 impl Error {
     /// Returns whether a map lacks the layers or the CRS that options give it.
     pub fn is_of_other_layers(&self) -> bool {
-        matches!(self, Error::UnknownLayer { .. } | Error::ContradictingSrs { .. })
+        matches!(
+            self,
+            Error::UnknownLayer { .. } | Error::Map(meshmark_marking::Error::ContradictingSrs { .. })
+        )
     }
 
     /// Returns whether bases do not belong to a map, to its key or to each other.
@@ -141,55 +138,14 @@ impl Error {
         )
     }
 
-    /// Returns the fault of a feature without the remedy.
-    pub(crate) fn fault(&self) -> String {
-        match self {
-            Error::NotFinite { layer, fid, x, y } => format!(
-                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are not finite numbers"
-            ),
-            Error::TooFar { layer, fid, x, y } => format!(
-                "layer \"{layer}\", feature {fid}: the coordinates ({x:?}, {y:?}) are further away than any place in the \
-                 CRS of the map"
-            ),
-            other => other.to_string(),
-        }
-    }
-
     /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
-        let srs = |crs: &str| spelling.value("SRS", crs);
         let base = |path: &Path| spelling.value("BASE", path.display());
         match self {
             Error::NoLayers => "the map has no vector layer: give a vector dataset that GDAL can open".into(),
             Error::UnknownLayer { name, known } => {
                 format!("the map has no layer \"{name}\": {} may name {known}", spelling.name("LAYERS"))
             }
-            Error::MixedCrs { first, first_crs, second, second_crs } => format!(
-                "layers \"{first}\" ({first_crs}) and \"{second}\" ({second_crs}) are not in the same CRS, and a mark \
-                 needs one: choose layers of one CRS with {}, or reproject first",
-                spelling.name("LAYERS")
-            ),
-            Error::NoCrs => format!(
-                "the map has no CRS and all its coordinates could be degrees: say which CRS it is, for example {}",
-                srs("EPSG:4326")
-            ),
-            Error::ContradictingSrs { crs, srs: given } => format!(
-                "the map has a CRS of its own ({crs}), and {} is another one: leave {} out",
-                srs(given),
-                spelling.name("SRS")
-            ),
-            Error::UnknownSrs(text) => {
-                format!("{} is not a CRS that PROJ knows: use for example EPSG:3067", srs(text))
-            }
-            Error::Geocentric(crs) => {
-                format!(
-                    "the CRS {crs} is geocentric, and a map needs a projected or geographic one: reproject first"
-                )
-            }
-            Error::NotFinite { .. } | Error::TooFar { .. } => {
-                format!("{}: correct the feature, or leave it out", self.fault())
-            }
-            Error::Geometry { layer, fid, source } => format!("layer \"{layer}\", feature {fid}: {source}"),
             Error::Unreadable { layer, reason } => {
                 format!("layer \"{layer}\" cannot be read to its end: {reason}")
             }
@@ -201,27 +157,6 @@ impl Error {
             Error::FewPlaces { layer, crs } => {
                 format!("most coordinates of layer \"{layer}\" have no place in {crs}: it is not their CRS")
             }
-            Error::TooLarge { most } => format!("the map has more than {most} vertices: cut it into sheets"),
-            Error::TooSmall { size_m, tolerance_m } => format!(
-                "the whole map is {size_m:.1e} m wide, and the mark moves vertices by up to {} m: if the units are not \
-                 those of its CRS, correct that ({}, -a_srs), else lower {} and {}",
-                spelling.value("TOLERANCE", tolerance_m),
-                spelling.name("SRS"),
-                spelling.name("TOLERANCE"),
-                spelling.name("AMPLITUDE")
-            ),
-            Error::UnevenScale { ends: [shortest, longest], off_percent, crs } => format!(
-                "the scale of {crs} differs by {off_percent:.0} % from the one that the mark of a message takes for the whole \
-                 map, so vertices would move further than is asked for: a unit is the shortest at the vertex ({}, {}), and \
-                 the longest at ({}, {}); mark for a recipient without {} and {}, reproject the map, for example to its UTM zone or to \
-                 EPSG:4326, or leave out what lies far from the rest",
-                shortest[0],
-                shortest[1],
-                longest[0],
-                longest[1],
-                spelling.name("CODE"),
-                spelling.name("CHIP_RATE")
-            ),
             Error::Traces(traces) => {
                 format!(
                     "{}, and {} marks no such map",
@@ -334,7 +269,7 @@ impl Error {
                 format!("{} cannot be read: {reason}", spelling.value("BASE_REFERENCE", path.display()))
             }
             Error::Gdal(error) => error.to_string(),
-            Error::Core(error) => error.text(spelling),
+            Error::Map(error) => error.text(spelling),
         }
     }
 }

@@ -1,10 +1,8 @@
 //! Geometries one by one, for comparing two maps feature by feature.
 
-use crate::{
-    CoordinateSystem, Error, Outline, Result, extent::Extent, selection::chosen_layers, turns::turn,
-    wkb::GeometryFault,
-};
+use crate::{CoordinateSystem, Error, Result, crs::as_crs, selection::chosen_layers, turns::turn};
 use gdal::{Dataset, vector::LayerAccess};
+use meshmark_marking::{self as marking, Extent, Outline};
 
 /// One geometry of a dataset.
 #[derive(Debug, Clone)]
@@ -34,17 +32,16 @@ pub fn features(
         let mut layer = dataset.layer(index)?;
         let srs = layer.defn().geom_fields().map(|field| field.spatial_ref().ok());
         let crs = srs.map(|srs| srs.and_then(CoordinateSystem::of_layer));
-        let extents: Vec<Extent> = crs.map(|crs| Extent::in_crs(crs.as_ref())).collect();
+        let extents: Vec<Extent> = crs.map(|crs| Extent::in_crs(as_crs(&crs))).collect();
         for feature in layer.features() {
             for (column, extent) in extents.iter().enumerate() {
                 // A null geometry is an error.
                 let Ok(geometry) = feature.geometry_by_index(column) else { continue };
                 let fid = feature.fid();
                 let id = || fid.map_or("without id".into(), |fid| fid.to_string());
-                let failed =
-                    |source: GeometryFault| Error::Geometry { layer: name.clone(), fid: id(), source };
-                let wkb = geometry.iso_wkb().map_err(|error| failed(error.into()))?;
-                let outline = Outline::of_wkb(wkb).map_err(|error| failed(error.into()))?;
+                let wkb = geometry.iso_wkb().map_err(|error| marking::Error::geometry(&name, id(), error))?;
+                let outline = Outline::of_wkb(wkb);
+                let outline = outline.map_err(|error| marking::Error::geometry(&name, id(), error))?;
                 outline.chains.iter().flatten().try_for_each(|&point| extent.check(point, &name, id))?;
                 all.push(FeatureGeometry { layer: name.clone(), fid, outline });
             }

@@ -1,8 +1,8 @@
 //! Geometries in GeoPackages (OGC 12-128r18, 2.1.3): a header, usually with the bounding box,
 //! followed by well-known binary.
 
-use crate::wkb::{self, WkbError};
 use gdal::vector::Geometry;
+use meshmark_marking::wkb::{self, WkbError};
 use std::borrow::Cow;
 
 /// Prefixes of the tables of the standard, of SQLite and of spatial indexes.

@@ -3,12 +3,10 @@
 //! Drivers of GDAL may fail silently, and formats round coordinates, reverse rings and reorder
 //! features; so the features of the written file are compared with those that were meant.
 
-use crate::{
-    decimals::Digits,
-    wkb::{self, GeometryFault, WkbError},
-};
+use crate::{decimals::Digits, geometry_fault::GeometryFault};
 use gdal::vector::{Feature, Layer, LayerAccess};
 use meshmark_core::counted;
+use meshmark_marking::wkb::{self, WkbError};
 use std::{
     cmp::Ordering,
     fmt,

@@ -4,6 +4,11 @@ use crate::{Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::options::join_list;
 
+/// The open options for any map. CSV files hold their coordinates as text, which would otherwise
+/// stay an attribute, and unmarked; layers of OpenStreetMap files must be read one at a time,
+/// whatever the configuration. With @ an option concerns only drivers that have it.
+pub const OPEN_OPTIONS: [&str; 2] = ["@KEEP_GEOM_COLUMNS=NO", "@INTERLEAVED_READING=NO"];
+
 /// The most vertices a map may have: their numbers are 32 bits wide.
 pub const MOST_VERTICES: usize = u32::MAX as usize;
 

@@ -1,13 +1,10 @@
 //! The walk over a dataset: every coordinate of every geometry of the chosen layers.
 
 use crate::{
-    CoordinateSystem, Error, Geometries, Result,
-    chains::{Chains, read_geometry},
-    crs::{self, reproject},
-    extent::Extent,
-    labels,
-    left_out::{Faults, LeftOut, MISSING, is_there},
-    parse_srs, polylines,
+    CoordinateSystem, Error, Result,
+    crs::{as_crs, reproject},
+    labels, parse_srs, polylines,
+    read_geometry::read_geometry,
     selection::{LabelFields, Selection, chosen_layers},
     turns::turn,
 };
@@ -20,7 +17,11 @@ use meshmark_core::{
     ground::Ground,
     map::Map,
     map_data::{Label, MapData, Polyline},
-    options::{AmplitudeOf, Parameters},
+    options::Parameters,
+};
+use meshmark_marking::{
+    self as marking, Chains, Crs, Extent, Faults, Geometries, LeftOut, Metric,
+    left_out::{MISSING, is_there},
 };
 use std::{collections::BTreeMap, ops::Range};
 
@@ -34,10 +35,7 @@ pub struct Survey {
     pub data: MapData,
     /// The CRS: the common one of the layers, or the target of a reprojection.
     pub crs: Option<CoordinateSystem>,
-    /// Metres per unit; `None` where the map has no CRS and its units may be degrees.
-    ground: Option<Ground>,
-    /// Metres per unit at the place of a vertex, where they vary over a projected map.
-    uneven: Option<Ground>,
+    metric: Metric,
     /// The geometries in the order of reading, if they were requested.
     pub geometries: Option<Geometries>,
     /// The number of features of each layer read, by the number of the layer in the dataset.
@@ -50,23 +48,23 @@ impl Survey {
     /// Returns metres on the ground at the place of a vertex.
     ///
     /// # Errors
-    /// Fails with [`Error::NoCrs`].
+    /// Fails with [`marking::Error::NoCrs`].
     pub fn measure(&self) -> Result<&Ground> {
-        self.uneven.as_ref().or(self.ground.as_ref()).ok_or(Error::NoCrs)
+        Ok(self.metric.local()?)
+    }
+
+    /// Returns its CRS as marking takes it.
+    pub fn crs(&self) -> Option<&dyn Crs> {
+        as_crs(&self.crs)
     }
 
     /// Returns the map as input of the algorithm. Marks of messages have one scale for a projected
     /// map; fingerprints follow its ground.
     ///
     /// # Errors
-    /// Fails with [`Error::NoCrs`].
+    /// Fails with [`marking::Error::NoCrs`].
     pub fn map(&self, parameters: &Parameters) -> Result<Map<'_>> {
-        let measure = self.measure()?;
-        let ground = match parameters.amplitude_of {
-            AmplitudeOf::Coefficient => self.ground.as_ref().ok_or(Error::NoCrs)?,
-            AmplitudeOf::Displacement => measure,
-        };
-        Ok(self.data.on(ground, measure))
+        Ok(self.metric.map(&self.data, parameters)?)
     }
 }
 
@@ -204,15 +202,9 @@ impl Found {
             false => Areas::default(),
         };
         let data = MapData { areas, labels, polylines, ..data };
-        let ground = match crs::ground(crs.as_ref(), &data.vertices) {
-            Ok(ground) => Some(ground),
-            Err(Error::NoCrs) => None,
-            Err(other) => return Err(other),
-        };
-        let uneven =
-            crs.as_ref().zip(ground.as_ref()).and_then(|(crs, ground)| crs.uneven(&data.vertices, ground));
+        let metric = Metric::measure(as_crs(&crs), &data.vertices)?;
         let geometries = keeps_geometries.then(|| Geometries::new(indices, chains));
-        Ok(Survey { data, crs, ground, uneven, geometries, features, left_out })
+        Ok(Survey { data, crs, metric, geometries, features, left_out })
     }
 }
 
@@ -249,7 +241,7 @@ impl<'a> Walk<'a> {
             features += 1;
             for (column, chains) in of_column.iter_mut().enumerate() {
                 let extent = match self.in_one_crs {
-                    true => Extent::in_crs(columns[column].as_ref()),
+                    true => Extent::in_crs(as_crs(&columns[column])),
                     false => Extent::ANY, // its true CRS may differ
                 };
                 let faults = match self.in_one_crs {
@@ -261,7 +253,7 @@ impl<'a> Walk<'a> {
             let vertices = self.found.chains.coords.len()
                 + of_column.iter().map(|chains| chains.coords.len()).sum::<usize>();
             if vertices > self.selection.most_vertices {
-                return Err(Error::TooLarge { most: self.selection.most_vertices });
+                return Err(marking::Error::TooLarge { most: self.selection.most_vertices }.into());
             }
             self.describe(&feature);
             if !self.in_one_crs {
@@ -317,7 +309,7 @@ impl<'a> Walk<'a> {
         let crs = |own: Option<CoordinateSystem>| match (own, &given) {
             (Some(own), Some(given)) if !own.is_same(given) => {
                 let [crs, srs] = own.names_apart(given);
-                Err(Error::ContradictingSrs { crs, srs })
+                Err(marking::Error::ContradictingSrs { crs, srs }.into())
             }
             (Some(own), _) => Ok(Some(own)),
             (None, given) => Ok(given.clone()),
@@ -345,7 +337,8 @@ impl<'a> Walk<'a> {
             (Some(a), Some(b)) => a.names_apart(b),
             _ => [name(first_crs), name(crs)],
         };
-        Err(Error::MixedCrs { first: first.clone(), first_crs, second: layer.into(), second_crs })
+        let first = first.clone();
+        Err(marking::Error::MixedCrs { first, first_crs, second: layer.into(), second_crs }.into())
     }
 }
 

@@ -4,10 +4,8 @@
 
 use gdal::vector::Geometry;
 use libfuzzer_sys::fuzz_target;
-use meshmark_dataset::{
-    geopackage::{map_coordinates, safe_layer_name},
-    wkb::{self, WkbError},
-};
+use meshmark_dataset::geopackage::{map_coordinates, safe_layer_name};
+use meshmark_marking::wkb::{self, WkbError};
 
 fuzz_target!(|bytes: &[u8]| {
     let mut blob = bytes.to_vec();

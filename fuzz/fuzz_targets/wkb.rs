@@ -3,7 +3,7 @@
 
 use gdal::vector::Geometry;
 use libfuzzer_sys::fuzz_target;
-use meshmark_dataset::{
+use meshmark_marking::{
     Outline,
     wkb::{Step, WkbError, map_coordinates, of_chains},
 };

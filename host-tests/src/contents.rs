@@ -4,7 +4,7 @@ use gdal::{
     Dataset,
     vector::{Layer, LayerAccess},
 };
-use meshmark_dataset::wkb::{self, WkbError};
+use meshmark_marking::wkb::{self, WkbError};
 use std::{collections::HashMap, path::Path};
 
 /// A layer with all its features.

@@ -14,10 +14,8 @@ use meshmark_core::{
     series::Series,
     signs::Signs,
 };
-use meshmark_dataset::{
-    Selection, Survey,
-    marking::{self, Lineage, Unmarked},
-};
+use meshmark_dataset::{GeosOfGdal, Selection, Survey};
+use meshmark_marking::{self as marking, Lineage, Unmarked};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -49,8 +47,8 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
     let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| ()).expect("it converges");
     let marked = embedding.settle(&fingerprint, &wanted[0]).expect("it is read back");
     let geometries = map.geometries.as_ref().expect("they were requested");
-    let distortion = Unmarked::new(geometries, &on_ground).distortion(&marked, parameters);
-    let reference = marking::reference(&map, marked.patches);
+    let distortion = Unmarked::new(geometries, &on_ground, &GeosOfGdal).distortion(&marked, parameters);
+    let reference = marking::reference(&map.data.vertices, map.crs(), marked.patches);
     let lineage = Lineage { parts: embedding.part_entries(), ..Lineage::default() };
     let record = marking::fingerprint_record(
         &options,

@@ -16,7 +16,8 @@ use meshmark_core::{
     spectrum::Basis,
     vertices::VertexTable,
 };
-use meshmark_dataset::{Selection, Survey, survey, wkb};
+use meshmark_dataset::{Selection, Survey, survey};
+use meshmark_marking::wkb;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -12,8 +12,19 @@ use std::{
     path::Path,
 };
 
-const CRATES: [&str; 9] =
-    ["core", "detection", "dataset", "plugin", "verifier", "host-tests", "studies", "benches", "cgal"];
+const CRATES: [&str; 11] = [
+    "core",
+    "detection",
+    "marking",
+    "dataset",
+    "plugin",
+    "verifier",
+    "python",
+    "host-tests",
+    "studies",
+    "benches",
+    "cgal",
+];
 
 #[test]
 fn no_crate_has_a_circle_of_imports() {

@@ -1,5 +1,5 @@
 use meshmark_dataset::decimals::Digits;
-use meshmark_dataset::wkb::WkbError;
+use meshmark_marking::wkb::WkbError;
 use std::{
     io::{self, ErrorKind},
     path::PathBuf,
@@ -130,3 +130,9 @@ pub enum RecordFault {
 }
 
 pub type Result<T> = std::result::Result<T, Error>;
+
+impl From<meshmark_marking::Error> for Error {
+    fn from(error: meshmark_marking::Error) -> Self {
+        Error::Dataset(error.into())
+    }
+}

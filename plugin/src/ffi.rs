@@ -12,9 +12,8 @@ use crate::{
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
-use meshmark_dataset::{
-    Selection, Survey, marked_view::PREFIX, marking::NotMoved, survey, threads, traces::ForeignMembers,
-};
+use meshmark_dataset::{Selection, Survey, marked_view::PREFIX, survey, threads, traces::ForeignMembers};
+use meshmark_marking::NotMoved;
 use std::{
     ffi::{CString, c_char},
     path::Path,

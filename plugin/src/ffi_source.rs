@@ -10,7 +10,7 @@ use crate::{
 };
 use gdal::{Dataset, GdalOpenFlags};
 use gdal_sys::{GDALDatasetH, OGRLayerH};
-use meshmark_dataset::{marked_view, marking::OPEN_OPTIONS};
+use meshmark_dataset::{OPEN_OPTIONS, marked_view};
 use std::{
     ffi::{CStr, CString, c_char, c_void},
     marker::PhantomData,

@@ -19,13 +19,12 @@ use meshmark_core::{
     recorded::Recorded,
 };
 use meshmark_dataset::{
-    Bases, LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool, damage_warning,
+    Bases, GeosOfGdal, LabelFields, MOST_VERTICES, Selection, Survey,
     decimals::Digits,
-    exposure,
-    marking::{self, Lineage, Moves, Unmarked},
     same_file, survey,
     traces::{self, ForeignMembers},
 };
+use meshmark_marking::{self as marking, Lineage, Moves, ThreadPool, Unmarked, damage_warning, exposure};
 use std::{fs::File, path::Path};
 
 /// The noise that the estimates from a file that was read back assume, metres.
@@ -178,7 +177,7 @@ impl Marking {
         source.files.check()?; // what was surveyed is what was opened
         let on_ground = map.map(&options.parameters)?;
         marking::check_extent(&on_ground, &options.parameters)?;
-        marking::check_scale(&on_ground, map.crs.as_ref())?;
+        marking::check_scale(&on_ground, map.crs())?;
         let mut read = |path: &Path, entry: &BaseEntry| {
             let selection = Selection { geometries: false, ..selection(options, source.last_failure) };
             let (layers, srs) = (entry.layers.as_deref(), entry.srs.as_deref());
@@ -192,19 +191,27 @@ impl Marking {
         let (marked, parts) = pool.install(|| request.embed(on_ground, &bases))?;
         let parameters = &options.parameters;
         let distortion = map.geometries.as_ref().map(|geometries| {
-            pool.install(|| Unmarked::new(geometries, &on_ground).distortion(&marked, parameters))
+            pool.install(|| {
+                Unmarked::new(geometries, &on_ground, &GeosOfGdal).distortion(&marked, parameters)
+            })
         });
         let areas = distortion.as_ref().map(|distortion| &distortion.areas);
         let spelling = Spelling::OpenOption;
         let damage = damage_warning(parameters, &marked.angles, areas, spelling);
         let record = distortion.map(|distortion| {
-            let reference = marking::reference(&map, marked.patches);
+            let reference = marking::reference(&map.data.vertices, map.crs(), marked.patches);
             let lineage = Lineage { parts, bases: bases.entries().to_vec() };
             marking::recorded(options, &request.subject, &request.key, (reference, lineage), distortion)
         });
         map.geometries = None;
         let message = options.coefficients.is_none().then(|| request.subject.carried(&request.key));
-        let of_mark = marking::warnings(options, message.as_ref(), &map, marked.patches, spelling);
+        let of_mark = marking::warnings(
+            options,
+            message.as_ref(),
+            (&map.data.vertices, map.crs()),
+            marked.patches,
+            spelling,
+        );
         let warnings = request.exposed.iter().cloned().chain(of_mark).chain(damage).collect();
         Ok(Marking {
             name: source.name,

@@ -8,7 +8,8 @@ use crate::{
 };
 use gdal::errors::GdalError;
 use meshmark_core::{counted, options::Spelling};
-use meshmark_dataset::{Error as MapError, marking::NotMoved, wkb::WkbError};
+use meshmark_dataset::Error as MapError;
+use meshmark_marking::{self as marking, NotMoved, wkb::WkbError};
 use std::{io, path::PathBuf, process::ExitStatus, string::FromUtf8Error};
 
 /// The result of every fallible function of this crate.
@@ -311,22 +312,13 @@ impl Error {
 
     /// Returns whether the layers and the CRS that a request names allow no mark on a map.
     pub(crate) fn is_about_options(&self) -> bool {
-        use meshmark_dataset::Error as Map;
+        use MapError::*;
         let Error::Map { source, .. } = self else { return false };
-        matches!(
-            **source,
-            Map::NoLayers
-                | Map::UnknownLayer { .. }
-                | Map::MixedCrs { .. }
-                | Map::NoCrs
-                | Map::Geocentric(_)
-                | Map::ContradictingSrs { .. }
-                | Map::UnknownSrs(_)
-                | Map::Reprojection { .. }
-                | Map::TooSmall { .. }
-                | Map::UnevenScale { .. }
-                | Map::Core(_)
-        )
+        match &**source {
+            NoLayers | UnknownLayer { .. } | Reprojection { .. } => true,
+            Map(fault) => fault.is_about_options(),
+            _ => false,
+        }
     }
 
     /// Returns the exit code of this error.
@@ -378,8 +370,9 @@ impl Error {
 
 fn of_map_that_is_read(error: &MapError) -> ExitCode {
     match error {
-        MapError::TooLarge { .. } => ExitCode::TooLarge,
-        MapError::UnknownLayer { .. } | MapError::UnknownSrs(_) | MapError::ContradictingSrs { .. } => {
+        MapError::Map(marking::Error::TooLarge { .. }) => ExitCode::TooLarge,
+        MapError::UnknownLayer { .. }
+        | MapError::Map(marking::Error::UnknownSrs(_) | marking::Error::ContradictingSrs { .. }) => {
             ExitCode::Usage
         }
         _ => ExitCode::Unreadable,

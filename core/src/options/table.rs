@@ -41,6 +41,8 @@ pub enum Spelling {
     OpenOption,
     /// The command line: `--patch-size`, `--patch-size 480`.
     Flag,
+    /// Python: `patch_size`, `patch_size=480`.
+    Keyword,
 }
 
 impl Spelling {
@@ -49,13 +51,14 @@ impl Spelling {
         match self {
             Spelling::OpenOption => name.into(),
             Spelling::Flag => format!("--{}", name.to_lowercase().replace('_', "-")),
+            Spelling::Keyword => name.to_lowercase(),
         }
     }
 
     /// Returns the option with a value.
     pub fn value(self, name: &str, value: impl std::fmt::Display) -> String {
         let between = match self {
-            Spelling::OpenOption => "=",
+            Spelling::OpenOption | Spelling::Keyword => "=",
             Spelling::Flag => " ",
         };
         format!("{}{between}{value}", self.name(name))

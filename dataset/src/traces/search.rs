@@ -7,11 +7,9 @@ use super::{
 };
 use crate::{
     CoordinateSystem, Error, Result, Survey,
-    chains::{Chains, read_geometry},
     crs::reproject,
-    extent::Extent,
     geojson_text::{has_foreign_places, without_places},
-    left_out::{Faults, LeftOut},
+    read_geometry::read_geometry,
     selection::chosen_layers,
     turns::turn,
 };
@@ -20,6 +18,7 @@ use gdal::{
     vector::{Feature, FieldValue, Layer, LayerAccess, OGRFieldType},
 };
 use meshmark_core::options::Options;
+use meshmark_marking::{Chains, Extent, Faults, LeftOut};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Values further apart in a text, or in a list, are no pair: `x1, 2.5, y1, 3.5` has a number between

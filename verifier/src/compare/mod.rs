@@ -17,8 +17,9 @@ use meshmark_core::{
     map::Map,
     vertices::VertexTable,
 };
-use meshmark_dataset::{
-    FeatureGeometry, Outline,
+use meshmark_dataset::{FeatureGeometry, GeosOfGdal};
+use meshmark_marking::{
+    Outline,
     quality::{self, Outlines, Quality, State},
 };
 use serde::Serialize;
@@ -201,7 +202,7 @@ impl Pairs<'_> {
         let before = |number: usize| Cow::Borrowed(&self.features[number].before);
         let after = |number: usize| Cow::Borrowed(&self.features[number].after);
         let (before, after) = (Outlines { count, get: &before }, Outlines { count, get: &after });
-        let [was, is] = [before, after].map(State::measure);
+        let [was, is] = [before, after].map(|map| State::measure(map, &GeosOfGdal));
         quality::BeforeAfter {
             before: (before, &was),
             after: (after, &is),

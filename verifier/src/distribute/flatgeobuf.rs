@@ -8,7 +8,8 @@
 use super::opening::open;
 use crate::{Error, Result, inputs::gdal_failures::GdalFailure};
 use gdal::vector::LayerAccess;
-use meshmark_dataset::{Action, file_error, marking::Moves};
+use meshmark_dataset::{Action, file_error};
+use meshmark_marking::Moves;
 use std::{fs, ops::Range, path::Path};
 
 /// The first bytes of a file of any version.

@@ -31,12 +31,9 @@ use copies::MarkedCopy;
 use marks::Marks;
 use meshmark_core::options::Spelling;
 use meshmark_dataset::{
-    Bases, Survey, ThreadPool, file_digest,
-    formats::Format,
-    marking::{self, Lineage, Unmarked},
-    threads,
-    workplace::Workplace,
+    Bases, GeosOfGdal, Survey, file_digest, formats::Format, threads, workplace::Workplace,
 };
+use meshmark_marking::{self as marking, Lineage, ThreadPool, Unmarked};
 use staging::Stage;
 use std::{
     fs,
@@ -75,7 +72,7 @@ pub fn distribute(
         let mut copies: Vec<MarkedCopy> =
             recipients.into_iter().map(|recipient| MarkedCopy::new(recipient, folder, format)).collect();
         let all = copies.len();
-        let reference = marking::reference(&map, 0);
+        let reference = marking::reference(&map.data.vertices, map.crs(), 0);
         let finished = copies.iter().map(|copy| copy.is_finished(options, key, (&map, &reference, &bases)));
         let finished: Vec<bool> = finished.collect::<Result<_>>()?;
         let mut finished = finished.into_iter();
@@ -113,10 +110,11 @@ fn run(
 ) -> Result<()> {
     let DistributeRequest { key, options, folder, .. } = request;
     let of_map = |error| maps::failed("map", &request.map, error);
+    let unsuited = |error: marking::Error| of_map(error.into());
     let parameters = &options.parameters;
     let map = survey.map(parameters).map_err(of_map)?;
-    marking::check_extent(&map, parameters).map_err(of_map)?;
-    marking::check_scale(&map, survey.crs.as_ref()).map_err(of_map)?;
+    marking::check_extent(&map, parameters).map_err(unsuited)?;
+    marking::check_scale(&map, survey.crs()).map_err(unsuited)?;
     let threads = threads();
     let pool = ThreadPool::new(threads, || (), || ());
     let pool = pool.map_err(|source| Error::Threads { source })?;
@@ -124,12 +122,13 @@ fn run(
     let series = pool.install(|| bases.series(map, parameters))?;
     let marks = pool.install(|| Marks::new(&map, &series, key, options))?;
     let message = options.coefficients.is_none().then(|| copies[0].carried(key));
-    let warnings = marking::warnings(options, message.as_ref(), survey, marks.patches(), Spelling::Flag);
+    let described = (&survey.data.vertices, survey.crs());
+    let warnings = marking::warnings(options, message.as_ref(), described, marks.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
     let lineage = Lineage { parts: marks.part_entries(), bases: bases.entries().to_vec() };
-    let reference = (marking::reference(survey, marks.patches()), lineage);
+    let reference = (marking::reference(&survey.data.vertices, survey.crs(), marks.patches()), lineage);
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
-    let unmarked = pool.install(|| Unmarked::new(geometries, &map));
+    let unmarked = pool.install(|| Unmarked::new(geometries, &map, &GeosOfGdal));
     let vertices = &survey.data.vertices;
     let warnings = Mutex::default();
     let map_sha256 = digest_of(&request.map)?;

@@ -9,8 +9,8 @@ use crate::{Error, Result};
 use meshmark_dataset::{
     Action, file_error,
     geopackage::{self, Bounds},
-    wkb::WkbError,
 };
+use meshmark_marking::wkb::WkbError;
 use rusqlite::{Connection, OpenFlags, params};
 use std::{fs, path::Path};
 

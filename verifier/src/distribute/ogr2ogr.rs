@@ -2,7 +2,7 @@
 //! write: feature ids, field subtypes, defaults, domains, metadata.
 
 use crate::{Error, Result};
-use meshmark_dataset::marking;
+use meshmark_dataset::OPEN_OPTIONS;
 use std::{
     collections::HashMap,
     path::{Path, PathBuf},
@@ -14,7 +14,7 @@ pub fn copy(format: &str, from: &Path, to: &Path, options: &[&str]) -> Result<Ve
     let mut command = Command::new("ogr2ogr");
     command
         .args(["-f", format])
-        .args(marking::OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]))
+        .args(OPEN_OPTIONS.iter().flat_map(|option| ["-oo", option]))
         .args(options)
         .arg(named(to))
         .arg(named(from))

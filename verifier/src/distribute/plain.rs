@@ -8,9 +8,9 @@ use meshmark_core::options::Options;
 use meshmark_dataset::{
     Action, Survey, file_error,
     formats::Format,
-    marking::Moves,
     traces::{ForeignSearch, Trace},
 };
+use meshmark_marking::Moves;
 use std::{
     fs,
     path::{Path, PathBuf},

@@ -3,7 +3,8 @@
 
 use crate::{Cause, Error, Result};
 use meshmark_core::vertices::VertexTable;
-use meshmark_dataset::{geojson_text::without_places, geopackage, marking::NotMoved};
+use meshmark_dataset::{geojson_text::without_places, geopackage};
+use meshmark_marking::NotMoved;
 use rusqlite::{Connection, OpenFlags};
 use std::path::{Path, PathBuf};
 

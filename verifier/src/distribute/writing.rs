@@ -14,13 +14,13 @@ use meshmark_core::{
     vertices::VertexTable,
 };
 use meshmark_dataset::{
-    Action, Error as MapError, damage_warning, digest_of_only_file, file_error,
+    Action, Error as MapError, digest_of_only_file, file_error,
     formats::Format,
-    marking::{self, Lineage, Moves, Unmarked},
     publication::{Move, Publication},
     read_back::ReadBack,
     workplace::Workplace,
 };
+use meshmark_marking::{self as marking, Lineage, Moves, Unmarked, damage_warning};
 use std::{collections::BTreeSet, ffi::OsStr, fs, path::Path, sync::Mutex};
 
 /// The input that all copies share.

@@ -14,8 +14,8 @@ use meshmark_core::{
     options::{Options, Spelling},
 };
 use meshmark_dataset::{
-    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, Selection, Survey, features, marked_view,
-    marking, survey,
+    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, OPEN_OPTIONS, Selection, Survey, features,
+    marked_view, survey,
     traces::{self, ForeignMembers},
 };
 use std::{collections::BTreeSet, path::Path};
@@ -150,7 +150,7 @@ pub(super) fn open_with(
     options: &[String],
 ) -> std::result::Result<Dataset, GdalFailure> {
     forget_failure();
-    let mut open_options = marking::OPEN_OPTIONS.to_vec();
+    let mut open_options = OPEN_OPTIONS.to_vec();
     open_options.push("@WRITE_GFS=NO"); // reading a map creates no file beside it
     open_options.extend(options.iter().map(String::as_str));
     let options = DatasetOptions {

@@ -10,6 +10,7 @@ use super::{
 use crate::{Cause, Error, Result, words::printable};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_dataset::{CoordinateSystem, LabelFields, Numbers, Survey, numbers};
+use meshmark_marking::{self as marking, Crs};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -51,7 +52,7 @@ pub fn suspect(suspect: &PrivateCopy, reference: &Survey) -> Result<Suspect> {
             Err(
                 meshmark_dataset::Error::Reprojection { .. }
                 | meshmark_dataset::Error::FewPlaces { .. }
-                | meshmark_dataset::Error::Core(_),
+                | meshmark_dataset::Error::Map(marking::Error::Core(_)),
             ) => {}
             Err(error) => return Err(failed(error)),
         }

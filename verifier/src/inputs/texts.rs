@@ -7,7 +7,7 @@ use meshmark_core::{
     key::{SecretKey, read_text},
     recorded::Recorded,
 };
-use meshmark_dataset::exposure;
+use meshmark_marking::exposure;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::{

@@ -27,13 +27,13 @@ use meshmark_core::{
     fingerprint_record::FingerprintShape,
     options::Parameters,
 };
-use meshmark_dataset::LeftOut;
 use meshmark_detection::{
     Observations,
     decision::{Decoys, Null, Verdict},
     matching::RadiusReason,
     registration::Registration,
 };
+use meshmark_marking::LeftOut;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::PathBuf};
 

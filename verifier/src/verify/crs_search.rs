@@ -8,6 +8,7 @@
 use crate::{inputs::suspects::Suspect, words::printable};
 use meshmark_dataset::{Assumption, Numbers, Survey, likely_assumptions, overlaps};
 use meshmark_detection::registration::{ReadAs, Registrar, Registration, Start};
+use meshmark_marking::Crs;
 
 /// A suspect and its registration.
 pub struct Registered {

@@ -16,7 +16,7 @@ use crate::{
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
 use meshmark_core::{fingerprint_record::PartEntry, map::Map};
-use meshmark_dataset::{Bases, CoordinateSystem, LeftOut, Survey};
+use meshmark_dataset::{Bases, CoordinateSystem, Survey};
 use meshmark_detection::{
     Matched, Observations, Reference,
     decision::{Decision, Expected, decide_among},
@@ -24,6 +24,7 @@ use meshmark_detection::{
     matching::{LEAST_MATCHED, Radius},
     registration::{Registrar, Registration, Start},
 };
+use meshmark_marking::{Crs, LeftOut};
 
 /// The evidence of a suspect.
 pub struct Examination {

@@ -6,10 +6,11 @@ use meshmark_core::{
     options::{Parameters, Subject},
     recorded::Recorded,
 };
-use meshmark_dataset::{LabelFields, marking::Lineage};
+use meshmark_dataset::LabelFields;
 use meshmark_detection::{
     Demodulator, Mark, decision::Expected, matching::RadiusChoice, registration::Start,
 };
+use meshmark_marking::Lineage;
 use std::path::PathBuf;
 
 /// What a mark carries.

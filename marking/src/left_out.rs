@@ -7,10 +7,10 @@ use crate::{Error, Result};
 const MOST_NAMED: usize = 10;
 
 /// A coordinate pair that is left out, before the chains are closed up.
-pub(crate) const MISSING: [f64; 2] = [f64::NAN; 2];
+pub const MISSING: [f64; 2] = [f64::NAN; 2];
 
 /// Returns whether a coordinate pair is not [`MISSING`].
-pub(crate) fn is_there(point: &[f64; 2]) -> bool {
+pub fn is_there(point: &[f64; 2]) -> bool {
     point[0].is_finite() && point[1].is_finite()
 }
 
@@ -31,12 +31,14 @@ impl LeftOut {
         self.coordinates == 0 && self.features == 0
     }
 
-    pub(crate) fn coordinate(&mut self, fault: impl FnOnce() -> String) {
+    /// Counts a coordinate pair, and names the fault of one of the first.
+    pub fn coordinate(&mut self, fault: impl FnOnce() -> String) {
         self.coordinates += 1;
         self.name(fault);
     }
 
-    pub(crate) fn feature(&mut self, fault: impl FnOnce() -> String) {
+    /// Counts a feature, and names the fault of one of the first.
+    pub fn feature(&mut self, fault: impl FnOnce() -> String) {
         self.features += 1;
         self.name(fault);
     }
@@ -49,7 +51,7 @@ impl LeftOut {
 }
 
 /// The treatment of faults while a map is read.
-pub(crate) enum Faults<'a> {
+pub enum Faults<'a> {
     /// The first one is an error.
     Fail,
     /// All are left out.
@@ -58,14 +60,14 @@ pub(crate) enum Faults<'a> {
 
 impl Faults<'_> {
     /// Returns what takes the place of a coordinate pair with this fault.
-    pub(crate) fn coordinate(&mut self, fault: Error) -> Result<[f64; 2]> {
+    pub fn coordinate(&mut self, fault: Error) -> Result<[f64; 2]> {
         let Faults::LeaveOut(left_out) = self else { return Err(fault) };
         left_out.coordinate(|| fault.fault());
         Ok(MISSING)
     }
 
     /// Ends a feature with this fault.
-    pub(crate) fn feature(&mut self, fault: Error) -> Result<()> {
+    pub fn feature(&mut self, fault: Error) -> Result<()> {
         let Faults::LeaveOut(left_out) = self else { return Err(fault) };
         left_out.feature(|| fault.fault());
         Ok(())

@@ -3,10 +3,12 @@
 //! GEOS decides validity and computes areas of intersections, but only of geometries that may
 //! overlap. An error handler may show its messages about invalid geometries.
 
+mod geos;
 mod linework;
 mod overlaps;
 mod sights;
 
+pub use geos::{Geos, Neighbours};
 pub use sights::Outlines;
 
 use crate::Outline;
@@ -27,12 +29,9 @@ pub struct State {
 
 impl State {
     /// Measures all geometries.
-    pub fn measure(outlines: Outlines) -> Self {
-        let sights: Vec<Sight> = (0..outlines.count)
-            .into_par_iter()
-            .map(|number| Sight::measure(&(outlines.get)(number)))
-            .collect();
-        let common = overlaps::common_areas(outlines, &sights);
+    pub fn measure(outlines: Outlines, geos: &dyn Geos) -> Self {
+        let sights = Sight::measure_all(outlines, geos);
+        let common = overlaps::common_areas(outlines, &sights, geos);
         State { sights, common }
     }
 }

@@ -1,6 +1,7 @@
 //! The overlaps of polygons.
 
 use super::{
+    geos::{Geos, Neighbours},
     linework::Linework,
     sights::{Outlines, Sight},
 };
@@ -11,15 +12,14 @@ use rstar::{
     RTree,
     primitives::{GeomWithData, Rectangle},
 };
-use std::{
-    cell::LazyCell,
-    collections::{BTreeMap, BTreeSet},
-};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Overlaps up to this are slivers of rounding, square metres.
 const SLIVER_M2: f64 = 1e-6;
 /// The segments of polygons with more vertices are sorted once, not for every neighbour.
 const MANY_VERTICES: usize = 256;
+/// Polygons whose common areas GEOS computes at once.
+const BATCH: usize = 1024;
 
 /// The bounding box of a polygon, and its number.
 type NumberedBounds = GeomWithData<Rectangle<[f64; 2]>, u32>;
@@ -28,20 +28,33 @@ type NumberedBounds = GeomWithData<Rectangle<[f64; 2]>, u32>;
 pub(super) type CommonAreas = BTreeMap<[u32; 2], f64>;
 
 /// Computes the common areas of pairs of valid polygons that have one, CRS units squared.
-pub(super) fn common_areas(outlines: Outlines, sights: &[Sight]) -> CommonAreas {
+pub(super) fn common_areas(outlines: Outlines, sights: &[Sight], geos: &dyn Geos) -> CommonAreas {
     let polygons = (0u32..).zip(sights).filter(|(_, sight)| sight.is_valid && sight.area > 0.0);
     let boxes: Vec<NumberedBounds> =
         polygons.map(|(number, sight)| NumberedBounds::new(sight.bounds.into(), number)).collect();
     let tree = RTree::bulk_load(boxes.clone());
     let search = Search { outlines, large: large(outlines, &boxes) };
-    let of_polygon = |polygon: &NumberedBounds| {
+    let near = |polygon: &NumberedBounds| {
         let near = tree.locate_in_envelope_intersecting(&sights[polygon.data as usize].bounds);
         let mut later: Vec<u32> =
             near.map(|other| other.data).filter(|other| *other > polygon.data).collect();
         later.sort_unstable();
-        search.common(polygon.data, &later)
+        search.not_apart(polygon.data, later)
     };
-    boxes.par_iter().flat_map_iter(of_polygon).collect()
+    let groups: Vec<(u32, Vec<u32>)> = boxes.par_iter().filter_map(near).collect();
+    let mut common = CommonAreas::new();
+    for batch in groups.chunks(BATCH) {
+        let outline = |number: u32| (outlines.get)(number as usize);
+        let neighbours = |(polygon, others): &(u32, Vec<u32>)| {
+            (outline(*polygon), others.iter().map(|other| outline(*other)).collect())
+        };
+        let of_batch: Vec<Neighbours> = batch.par_iter().map(neighbours).collect();
+        for ((polygon, others), areas) in batch.iter().zip(geos.common_areas(&of_batch)) {
+            let pairs = others.iter().zip(areas).filter(|(_, area)| *area > 0.0);
+            common.extend(pairs.map(|(other, area)| ([*polygon, *other], area)));
+        }
+    }
+    common
 }
 
 /// Returns the segments of all polygons with many vertices; `None` for those that do not consist of
@@ -70,28 +83,19 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Computes the common areas of a polygon with others.
-    fn common(&self, polygon: u32, others: &[u32]) -> Vec<([u32; 2], f64)> {
+    /// Returns a polygon with those of the others that it may overlap, if there are any.
+    fn not_apart(&self, polygon: u32, mut others: Vec<u32>) -> Option<(u32, Vec<u32>)> {
         if others.is_empty() {
-            return Vec::new();
+            return None;
         }
         let outline = (self.outlines.get)(polygon as usize);
         let own = if self.large.contains_key(&polygon) { None } else { rings(&outline) };
         let lines = self.large.get(&polygon).unwrap_or(&own);
-        let whole = LazyCell::new(|| outline.geometry());
-        let common = |other: &u32| {
-            let large = self.large.get(other);
-            if large.is_some_and(|large| are_apart(lines, large)) {
-                return None;
-            }
-            let neighbour = (self.outlines.get)(*other as usize);
-            if large.is_none() && are_apart(lines, &rings(&neighbour)) {
-                return None;
-            }
-            let area = whole.as_ref()?.intersection(&neighbour.geometry()?)?.area();
-            (area > 0.0).then_some(([polygon, *other], area))
-        };
-        others.iter().filter_map(common).collect()
+        others.retain(|other| match self.large.get(other) {
+            Some(large) => !are_apart(lines, large),
+            None => !are_apart(lines, &rings(&(self.outlines.get)(*other as usize))),
+        });
+        (!others.is_empty()).then_some((polygon, others))
     }
 }
 
@@ -154,56 +158,6 @@ impl Overlap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quality::{BeforeAfter, Quality, State};
-    use gdal::vector::Geometry;
-    use meshmark_core::ground::Ground;
-    use std::borrow::Cow;
-
-    fn outlines(texts: &[String]) -> Vec<Outline> {
-        let outline = |text: &String| Outline::of_wkb(Geometry::from_wkt(text).unwrap().wkb().unwrap());
-        texts.iter().map(|text| outline(text).unwrap()).collect()
-    }
-
-    fn quality(before: &[String], after: &[String], grid: f64) -> Quality {
-        let (before, after) = (outlines(before), outlines(after));
-        let [get_before, get_after] =
-            [&before, &after].map(|all| move |number: usize| Cow::Borrowed(&all[number]));
-        let before = Outlines { count: before.len(), get: &get_before };
-        let after = Outlines { count: after.len(), get: &get_after };
-        let (states, ground) = ([before, after].map(State::measure), Ground::METRES);
-        BeforeAfter { before: (before, &states[0]), after: (after, &states[1]), measure: &ground, grid }
-            .quality()
-    }
-
-    fn square(x: f64, y: f64, size: f64) -> String {
-        let (right, top) = (x + size, y + size);
-        format!("(({x} {y}, {right} {y}, {right} {top}, {x} {top}, {x} {y}))")
-    }
-
-    fn polygon(x: f64, y: f64, size: f64) -> String {
-        format!("POLYGON {}", square(x, y, size))
-    }
-
-    /// Returns a circle of so many vertices.
-    fn circle(vertices: usize, radius: f64) -> String {
-        let place = |i: usize| {
-            let (y, x) = (std::f64::consts::TAU * (i % vertices) as f64 / vertices as f64).sin_cos();
-            format!("{} {}", radius * x, radius * y)
-        };
-        format!("POLYGON (({}))", (0..=vertices).map(place).collect::<Vec<_>>().join(", "))
-    }
-
-    #[test]
-    fn an_overlap_up_to_a_cell_of_the_grid_is_a_sliver() {
-        let before = [polygon(0.0, 0.0, 1.0), polygon(1.0, 0.0, 1.0)];
-        let after = [polygon(0.0, 0.0, 1.0), polygon(0.995, 0.0, 1.0)];
-        let exact = quality(&before, &after, 0.0);
-        assert_eq!((exact.overlaps.new, exact.overlaps.new_slivers), (1, 0));
-        assert_eq!(exact.newly_overlapping, [[0, 1]]);
-        assert!((exact.overlaps.new_area_m2 - 0.005).abs() < 1e-9);
-        let on_grid = quality(&before, &after, 0.1).overlaps;
-        assert_eq!((on_grid.new, on_grid.new_slivers, on_grid.new_area_m2), (0, 1, 0.0));
-    }
 
     #[test]
     fn a_sliver_that_grows_a_little_is_not_new() {
@@ -211,35 +165,5 @@ mod tests {
         assert!(!of(0.997e-6, 1.002e-6));
         assert!(of(0.997e-6, 2.1e-6) && of(0.0, 1.1e-6));
         assert!(!of(0.0, 0.9e-6) && !of(1.0, 2.0));
-    }
-
-    #[test]
-    fn arcs_overlap_by_their_bellies() {
-        let disc = "CURVEPOLYGON (CIRCULARSTRING (0 0, 10 0, 0 0))".to_string();
-        for (other, expected) in
-            [(polygon(4.5, 3.0, 1.0), 1), (polygon(4.5, 5.5, 1.0), 0), (polygon(0.0, 4.0, 1.0), 0)]
-        {
-            let all = [disc.clone(), other.clone()];
-            assert_eq!(quality(&all, &all, 0.0).overlaps.before, expected, "{other}");
-        }
-    }
-
-    #[test]
-    fn what_lies_inside_overlaps_and_what_lies_in_a_hole_does_not() {
-        for vertices in [8, 40, 1000] {
-            let disc = circle(vertices, 10.0);
-            let ring = disc.replace("))", &format!("), {}", &square(-2.0, -2.0, 4.0)[1..]));
-            let overlaps = |other: &String| {
-                let all = [disc.clone(), other.clone()];
-                quality(&all, &all, 0.0).overlaps.before
-            };
-            assert_eq!(overlaps(&polygon(0.0, 0.0, 1.0)), 1, "inside");
-            assert_eq!(overlaps(&polygon(7.9, 7.9, 1.0)), 0, "in the corner of its box");
-            let islands = format!("MULTIPOLYGON ({}, {})", square(7.9, 7.9, 1.0), square(0.0, 0.0, 1.0));
-            assert_eq!(overlaps(&islands), 1, "the second part inside");
-            assert_eq!(overlaps(&polygon(-20.0, -20.0, 40.0)), 1, "around it");
-            let in_hole = [ring, polygon(-1.0, -1.0, 2.0)];
-            assert_eq!(quality(&in_hole, &in_hole, 0.0).overlaps.before, 0, "in its hole");
-        }
     }
 }

@@ -15,21 +15,6 @@ pub enum WkbError {
     NoHeader,
 }
 
-/// The reason why a geometry cannot be read.
-#[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-#[allow(missing_docs)] // the messages are the documentation
-pub enum GeometryFault {
-    Gdal(Box<gdal::errors::GdalError>),
-    Wkb(#[from] WkbError),
-}
-
-impl From<gdal::errors::GdalError> for GeometryFault {
-    fn from(error: gdal::errors::GdalError) -> Self {
-        GeometryFault::Gdal(Box::new(error))
-    }
-}
-
 const MOST_NESTED: usize = 64;
 
 /// The role of a coordinate pair: it begins a sequence (ring, line, point) or is joined to the pair
@@ -109,7 +94,7 @@ fn sequence_bytes(chain: &[[f64; 2]]) -> Vec<u8> {
 
 /// Returns whether a legal geometry consists of points, lines or polygons. All others may have
 /// arcs, which coordinates alone do not describe.
-pub(crate) fn is_plain(wkb: &[u8]) -> bool {
+pub fn is_plain(wkb: &[u8]) -> bool {
     let code = wkb.get(1..5).and_then(|code| code.try_into().ok()).unwrap_or_default();
     let code = if wkb.first() == Some(&1) { u32::from_le_bytes(code) } else { u32::from_be_bytes(code) };
     matches!(decode_type(code).0, 1..=6)

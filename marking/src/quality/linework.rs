@@ -124,12 +124,10 @@ fn may_meet(s: &Line<[f64; 2]>, t: &Line<[f64; 2]>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gdal::vector::Geometry;
+    use crate::wkb::{self, Step};
 
     fn line(vertices: impl Iterator<Item = [f64; 2]>) -> Outline {
-        let text: Vec<String> = vertices.map(|[x, y]| format!("{x} {y}")).collect();
-        let geometry = Geometry::from_wkt(&format!("LINESTRING ({})", text.join(", "))).unwrap();
-        Outline::of_wkb(geometry.wkb().unwrap()).unwrap()
+        Outline::of_wkb(wkb::of_chains(&[vertices.collect()], &[Step::First])).unwrap()
     }
 
     #[test]

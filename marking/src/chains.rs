@@ -1,37 +1,69 @@
 //! Chains of coordinates in reading order: rings, lines and points, one after the other.
 
 use crate::{
-    Error, Result,
-    extent::Extent,
+    Error, Extent, Result,
     left_out::{Faults, is_there},
-    wkb::{self, GeometryFault, Step},
+    wkb::{self, Step, WkbError},
 };
-use gdal::vector::Feature;
 use meshmark_core::map_data::ChainKind;
 use std::collections::BTreeMap;
 
 /// Coordinates of rings, lines and points, one after the other.
-#[derive(Clone, Default)]
-pub(crate) struct Chains {
-    pub(crate) coords: Vec<[f64; 2]>,
+#[derive(Debug, Clone, Default)]
+pub struct Chains {
+    /// CRS units.
+    pub coords: Vec<[f64; 2]>,
     /// The index in `coords` where each chain starts, ascending.
-    pub(crate) starts: Vec<u32>,
+    pub starts: Vec<u32>,
     /// The kind of each chain.
-    pub(crate) kinds: Vec<Step>,
+    pub kinds: Vec<Step>,
     /// The number of the first chain of each geometry, ascending.
-    pub(crate) firsts: Vec<u32>,
+    pub firsts: Vec<u32>,
     /// The geometries that their chains do not describe completely, by number.
-    pub(crate) others: BTreeMap<u32, Vec<u8>>,
+    pub others: BTreeMap<u32, Vec<u8>>,
 }
 
 impl Chains {
     /// Returns the role of each chain in polygons.
-    pub(crate) fn chain_kinds(&self) -> impl Iterator<Item = ChainKind> {
+    pub fn chain_kinds(&self) -> impl Iterator<Item = ChainKind> {
         self.kinds.iter().map(|step| match step {
             Step::Shell => ChainKind::Shell,
             Step::Hole => ChainKind::Hole,
             Step::First | Step::Next => ChainKind::Line,
         })
+    }
+
+    /// Appends the coordinates of one geometry, well-known binary, of the feature `fid` of a layer.
+    /// Those that are left out are [missing](crate::left_out::MISSING). Geometries that their chains
+    /// do not describe are kept if `keeps_geometries`.
+    ///
+    /// # Errors
+    /// Fails on a malformed geometry and on coordinates outside the extent, unless faults are left
+    /// out.
+    pub fn read(
+        &mut self,
+        mut bytes: Vec<u8>,
+        (layer, fid): (&str, &dyn Fn() -> String),
+        (keeps_geometries, extent): (bool, Extent),
+        mut faults: Faults,
+    ) -> Result<()> {
+        if keeps_geometries && !wkb::is_plain(&bytes) {
+            self.others.insert(self.firsts.len() as u32, bytes.clone());
+        }
+        self.begin_geometry();
+        let mut visit = |step, point: [f64; 2]| {
+            let kept =
+                extent.check(point, layer, fid).map_or_else(|fault| faults.coordinate(fault), |()| Ok(point));
+            self.push(step, kept?);
+            Ok(point)
+        };
+        match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
+            visit(step, point).map_err(Visit::Ours)
+        }) {
+            Ok(()) => Ok(()),
+            Err(Visit::Ours(error)) => Err(error),
+            Err(Visit::Wkb(error)) => faults.feature(Error::geometry(layer, fid(), error)),
+        }
     }
 
     fn begin_geometry(&mut self) {
@@ -48,7 +80,7 @@ impl Chains {
 
     /// Removes the missing coordinates. What is left of a ring or line is a line on either side of
     /// each, and the holes of a ring that is not whole are lines.
-    pub(crate) fn close_up(&mut self) {
+    pub fn close_up(&mut self) {
         if self.coords.iter().all(is_there) {
             return;
         }
@@ -77,7 +109,8 @@ impl Chains {
         firsts.for_each(|_| self.begin_geometry());
     }
 
-    pub(crate) fn append(&mut self, other: &mut Chains) {
+    /// Appends the chains of another walk, which is then empty.
+    pub fn append(&mut self, other: &mut Chains) {
         let (of_starts, offset) = (self.starts.len() as u32, self.coords.len() as u32);
         let geometries = self.firsts.len() as u32;
         let others = std::mem::take(&mut other.others);
@@ -89,50 +122,13 @@ impl Chains {
     }
 }
 
-/// Appends the coordinates of one geometry of a feature. Those that are left out are [missing].
-///
-/// [missing]: crate::left_out::MISSING
-pub(crate) fn read_geometry(
-    feature: &Feature,
-    column: usize,
-    layer: &str,
-    (keeps_geometries, extent): (bool, Extent),
-    mut faults: Faults,
-    chains: &mut Chains,
-) -> Result<()> {
-    let Ok(geometry) = feature.geometry_by_index(column) else { return Ok(()) }; // a null geometry
-    let fid = || feature.fid().map_or("without id".into(), |fid| fid.to_string());
-    let failed = |source: GeometryFault| Error::Geometry { layer: layer.into(), fid: fid(), source };
-    let mut bytes = match geometry.iso_wkb() {
-        Ok(bytes) => bytes,
-        Err(error) => return faults.feature(failed(error.into())),
-    };
-    if keeps_geometries && !wkb::is_plain(&bytes) {
-        chains.others.insert(chains.firsts.len() as u32, bytes.clone());
-    }
-    chains.begin_geometry();
-    let mut visit = |step, point: [f64; 2]| {
-        let kept =
-            extent.check(point, layer, fid).map_or_else(|fault| faults.coordinate(fault), |()| Ok(point));
-        chains.push(step, kept?);
-        Ok(point)
-    };
-    match wkb::map_coordinates::<Visit>(&mut bytes, &mut |step, point| {
-        visit(step, point).map_err(Visit::Ours)
-    }) {
-        Ok(()) => Ok(()),
-        Err(Visit::Ours(error)) => Err(error),
-        Err(Visit::Wkb(error)) => faults.feature(failed(error.into())),
-    }
-}
-
 enum Visit {
     Ours(Error),
-    Wkb(wkb::WkbError),
+    Wkb(WkbError),
 }
 
-impl From<wkb::WkbError> for Visit {
-    fn from(error: wkb::WkbError) -> Self {
+impl From<WkbError> for Visit {
+    fn from(error: WkbError) -> Self {
         Visit::Wkb(error)
     }
 }

@@ -1,0 +1,90 @@
+"""Layers of any kind as well-known binary, and back."""
+
+import numpy
+import shapely
+
+from ._crs import Crs
+
+
+class Column:
+    """A geometry column of a layer, as the extension takes it."""
+
+    def __init__(self, layer, geometries, crs, index=None):
+        self.name = layer
+        self.geometries = geometries
+        self.crs = Crs(crs) if crs is not None else None
+        self._index = index
+
+    def fid(self, number):
+        """Return the name of a feature for messages."""
+        return str(number if self._index is None else self._index[number])
+
+
+class Frame:
+    """A GeoDataFrame."""
+
+    def __init__(self, name, frame):
+        self.frame = frame
+        self.names = [name for name, dtype in frame.dtypes.items() if str(dtype) == "geometry"]
+        self.columns = [
+            Column(name, wkb_of(frame[column].to_numpy()), frame[column].crs, frame.index) for column in self.names
+        ]
+
+    def moved(self, geometries):
+        """Return a copy with these geometries, those of each column."""
+        copy = self.frame.copy()
+        for name, moved in zip(self.names, geometries):
+            series = self.frame[name]
+            copy[name] = type(series)(shapely.from_wkb(moved), index=series.index, crs=series.crs)
+        return copy
+
+
+class Series:
+    """A GeoSeries."""
+
+    def __init__(self, name, series):
+        self.series = series
+        self.columns = [Column(name, wkb_of(series.to_numpy()), series.crs, series.index)]
+
+    def moved(self, geometries):
+        """Return a copy with these geometries."""
+        series = self.series
+        array = shapely.from_wkb(geometries[0])
+        return type(series)(array, index=series.index, crs=series.crs, name=series.name)
+
+
+class Array:
+    """An array of shapely's geometries, without a CRS of its own."""
+
+    def __init__(self, name, array):
+        self.shape = array.shape
+        self.columns = [Column(name, wkb_of(array.ravel()), None)]
+
+    def moved(self, geometries):
+        """Return an array of the same shape with these geometries."""
+        moved = numpy.empty(len(geometries[0]), dtype=object)
+        moved[:] = shapely.from_wkb(geometries[0])
+        return moved.reshape(self.shape)
+
+
+def wkb_of(array):
+    """Return geometries as well-known binary, heights and measures included."""
+    return shapely.to_wkb(array, output_dimension=4, byte_order=1, flavor="iso").tolist()
+
+
+def source(name, layer, geometry):
+    """Return a layer of whichever kind; `geometry` names the geometry column of a table without metadata."""
+    if hasattr(layer, "geometry") and hasattr(layer, "crs"):
+        return (Frame if hasattr(layer, "columns") else Series)(name, layer)
+    if isinstance(layer, numpy.ndarray) and layer.dtype == object:
+        return Array(name, layer)
+    if hasattr(layer, "__arrow_c_stream__"):
+        try:
+            from ._arrow import Table
+        except ImportError:
+            raise ImportError('a table needs pyarrow: pip install "meshmark[arrow]"') from None
+        return Table(name, layer, geometry)
+    raise TypeError(
+        f"layer {name!r} is a {type(layer).__name__}, and not a GeoDataFrame, an array of shapely's geometries or a "
+        "table with the Arrow interface: make one with geopandas.GeoDataFrame(..., geometry=..., crs=...)"
+    )

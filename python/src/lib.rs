@@ -1,0 +1,24 @@
+//! The module `meshmark._meshmark`, on which the Python package `meshmark` rests: layers as lists of
+//! well-known binary in, marked layers and a record out. The package brings the CRS of pyproj and the
+//! GEOS of shapely.
+#![deny(unsafe_code)]
+
+mod crs;
+mod errors;
+mod geos;
+mod key;
+mod layer;
+mod marking;
+mod record;
+mod waiting;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _meshmark(module: &Bound<PyModule>) -> PyResult<()> {
+    errors::add(module)?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<key::Key>()?;
+    module.add_class::<record::Record>()?;
+    module.add_function(wrap_pyfunction!(marking::mark, module)?)
+}
