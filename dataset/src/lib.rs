@@ -30,6 +30,7 @@ pub mod publication;
 pub mod quality;
 pub mod read_back;
 mod selection;
+mod sheets;
 mod survey;
 mod threads;
 pub mod traces;

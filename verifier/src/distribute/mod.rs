@@ -33,7 +33,7 @@ use meshmark_core::options::Spelling;
 use meshmark_dataset::{
     Bases, Survey, ThreadPool, file_digest,
     formats::Format,
-    marking::{self, Lineage, Unmarked},
+    marking::{self, Unmarked},
     threads,
     workplace::Workplace,
 };
@@ -126,7 +126,7 @@ fn run(
     let message = options.coefficients.is_none().then(|| copies[0].carried(key));
     let warnings = marking::warnings(options, message.as_ref(), survey, marks.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
-    let lineage = Lineage { parts: marks.part_entries(), bases: bases.entries().to_vec() };
+    let lineage = bases.lineage(marks.part_entries(), series.census());
     let reference = (marking::reference(survey, marks.patches()), lineage);
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
     let unmarked = pool.install(|| Unmarked::new(geometries, &map));
