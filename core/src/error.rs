@@ -12,6 +12,7 @@ pub enum Error {
     TooWide { span: f64 },
     NoVertices,
     TooFewVertices { vertices: usize, patch_size: usize, code: Code, chip_rate: usize },
+    TooFewFree { free: usize, vertices: usize, patch_size: usize },
     Collinear { vertices: usize },
     TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize, of: usize },
     TooManySigns { coefficients: usize, vertices: usize, of: usize },
@@ -23,6 +24,8 @@ pub enum Error {
     Message(String),
     Key(KeyFault),
     Record(RecordFault),
+    Plan(PlanFault),
+    Anchors { vertices: usize },
     UnknownOption(String),
     RepeatedOption(&'static str),
     EmptyOption(&'static str),
@@ -30,7 +33,7 @@ pub enum Error {
     Quotes { option: &'static str, value: String },
     IllegalValue { option: &'static str, value: String, kind: Kind },
     BothSubjects,
-    BaseOfMessage,
+    OfMessage { option: &'static str },
     NoReference,
 }
 
@@ -46,7 +49,7 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            Error::Record(RecordFault::Json(source)) => Some(source),
+            Error::Record(RecordFault::Json(source)) | Error::Plan(PlanFault::Json(source)) => Some(source),
             Error::Record(RecordFault::Value(source)) => Some(source),
             _ => None,
         }
@@ -91,6 +94,7 @@ pub enum RecordFault {
     WhitenedRecipient,
     Coefficients { found: usize, most: usize },
     Digest { text: String },
+    Anchors,
     NoPart,
     UnknownBase { digest: String },
     OwnBase,
@@ -118,8 +122,28 @@ impl fmt::Display for RecordFault {
                 write!(f, "a base has the base {digest}, which is not listed before it")
             }
             RecordFault::OwnBase => f.write_str("it names its own edition as a base"),
+            RecordFault::Anchors => f.write_str("it names anchors that are no vertices of its reference"),
             RecordFault::NoPart => f.write_str("it names no part of the map"),
             RecordFault::NoRecipient => f.write_str("it has no recipient"),
+        }
+    }
+}
+
+/// The reason why a text is not a plan.
+#[derive(Debug)]
+#[allow(missing_docs)] // the messages are the documentation
+pub enum PlanFault {
+    Json(serde_json::Error),
+    Version { found: u32, expected: u32 },
+    Anchors { file: String },
+}
+
+impl fmt::Display for PlanFault {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            PlanFault::Json(source) => source.fmt(f),
+            PlanFault::Version { found, expected } => write!(f, "version {found} instead of {expected}"),
+            PlanFault::Anchors { file } => write!(f, "{file} has anchors that are none of its vertices"),
         }
     }
 }
@@ -141,6 +165,12 @@ impl Error {
             Error::TooFewVertices { vertices, patch_size, code, chip_rate } => {
                 too_few(*vertices, *patch_size, *code, *chip_rate, spelling)
             }
+            Error::TooFewFree { free, vertices, patch_size } => format!(
+                "only {free} of the {vertices} vertices of the sheet are away from other sheets, too few for {} of a mark: \
+                 use a smaller {}, or plan larger sheets, or sheets that overlap less",
+                spelling.value("PATCH_SIZE", patch_size),
+                name("PATCH_SIZE")
+            ),
             Error::Collinear { vertices } => format!(
                 "all {vertices} distinct vertices lie on one straight line, so they have no mesh: mark a map whose \
                  vertices spread over an area"
@@ -200,6 +230,13 @@ impl Error {
             Error::Record(reason) => {
                 format!("malformed record: {reason}; a record is what the driver writes to RECORD=")
             }
+            Error::Plan(reason) => {
+                format!("malformed plan: {reason}; a plan is what `meshmark plan` writes")
+            }
+            Error::Anchors { vertices } => format!(
+                "the record names anchors that are none of the {vertices} vertices of its reference: give the record as it \
+                 was written"
+            ),
             Error::UnknownOption(option) => {
                 let known: Vec<_> = OPTIONS.iter().map(|o| name(o.name)).collect();
                 format!("unknown option {option}: use {}", known.join(", "))
@@ -223,9 +260,9 @@ impl Error {
                 "there is no {}: name a GeoPackage for the unmarked map, which nobody else will have",
                 name("REFERENCE")
             ),
-            Error::BaseOfMessage => format!(
+            Error::OfMessage { option } => format!(
                 "{} is for fingerprints: give a {}, and neither {} nor {}",
-                name("BASE"),
+                name(option),
                 name("RECIPIENT"),
                 name("CODE"),
                 name("CHIP_RATE")

@@ -6,11 +6,13 @@
 
 use crate::{
     Error, Result,
+    anchors::Anchors,
     error::RecordFault,
     key::SecretKey,
     options::{AmplitudeOf, Laplacian, Options, PATCH_SIZE_RANGE, Parameters, Rigidity, Subject},
     part::PartDigest,
     record::Distortion,
+    series::Census,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -46,6 +48,12 @@ pub struct FingerprintRecord {
     /// them; omitted when there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bases: Vec<BaseEntry>,
+    /// The vertices that stay in place, as the sheet fits others; omitted when there are none.
+    #[serde(default, skip_serializing_if = "Anchors::is_empty")]
+    pub anchors: Anchors,
+    /// How the vertices of the map are divided, where some stand or stay; omitted in other records.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub census: Option<Census>,
     /// What marking did to the map, by the names of version 1.
     #[serde(flatten)]
     pub distortion: Distortion,
@@ -105,6 +113,9 @@ pub struct BaseEntry {
     pub srs: Option<String>,
     /// Digests of the vertices of its own bases, in the order of its record.
     pub bases: Vec<String>,
+    /// Its vertices that stay in place; omitted when there are none.
+    #[serde(default, skip_serializing_if = "Anchors::is_empty")]
+    pub anchors: Anchors,
 }
 
 /// A part of the map, as a record describes it.
@@ -189,6 +200,7 @@ impl FingerprintRecord {
             record_path: None,
             bases: None,
             base_references: None,
+            sheets: None,
         }
     }
 
@@ -200,6 +212,7 @@ impl FingerprintRecord {
             layers: self.layers.clone(),
             srs: self.srs.clone(),
             bases: self.bases.iter().map(digest).collect(),
+            anchors: self.anchors.clone(),
         };
         self.bases.iter().cloned().chain([own]).collect()
     }
@@ -233,6 +246,9 @@ impl FingerprintRecord {
         }
         if let Some(digest) = self.bases.iter().enumerate().find_map(late) {
             return fault(RecordFault::UnknownBase { digest });
+        }
+        if !self.anchors.fit(self.reference.vertices) {
+            return fault(RecordFault::Anchors);
         }
         if self.parts.is_empty() {
             return fault(RecordFault::NoPart);
@@ -286,6 +302,8 @@ mod tests {
             copy: CopyEntry { file_sha256: Some("0f".repeat(32)) },
             parts: vec![PartEntry { sha256: PartDigest::new(&vertices), vertices: 1, patches: 1 }],
             bases: Vec::new(),
+            anchors: Anchors::default(),
+            census: None,
             distortion: Distortion {
                 displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },
                 angles: AngleChange::at(&[]),
@@ -347,7 +365,9 @@ mod tests {
         assert_eq!(chain[..2], record.bases);
         assert_eq!(chain[2].vertices_sha256, record.reference.vertices_sha256);
         assert_eq!(chain[2].bases, ["ab", "cd"].map(|byte| byte.repeat(32)));
-        assert!(!self::record().to_json().contains("bases"), "records of one edition are as before");
+        for field in ["bases", "anchors", "census"] {
+            assert!(!self::record().to_json().contains(field), "records of one edition are as before");
+        }
     }
 
     #[test]
@@ -365,6 +385,7 @@ mod tests {
             ("/parts/0/sha256", json!("00"), "64 hexadecimal digits"),
             ("/bases", json!([base("ab", &[]), base("?", &[])]), "is no digest"),
             ("/bases", json!([base("cd", &["ab"]), base("ab", &[])]), "not listed before it"),
+            ("/anchors", json!("1"), "no vertices of its reference"),
             ("/recipient", json!(" "), "no recipient"),
             ("/recipient", json!(null), "invalid type: null"),
         ] {

@@ -37,8 +37,10 @@
 #![warn(missing_docs)]
 
 pub mod agreement;
+pub mod anchors;
 pub mod areas;
 pub mod bodies;
+pub mod borders;
 pub mod carrier;
 pub mod code;
 pub mod constraints;
@@ -76,6 +78,7 @@ pub mod recorded;
 mod response;
 pub mod scale;
 pub mod series;
+pub mod sheet_plan;
 mod sides;
 pub mod signs;
 pub mod spectrum;

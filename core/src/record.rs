@@ -154,6 +154,7 @@ impl Record {
             record_path: None,
             bases: None,
             base_references: None,
+            sheets: None,
         };
         options.check().map_err(illegal)?;
         Ok(options)

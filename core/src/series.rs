@@ -5,6 +5,9 @@
 //! *attached*: they follow these and carry no signs. All other new vertices are the part of the
 //! edition, where they are enough of them; fewer stay in place. So every vertex is in at most one
 //! part, each part is the same in all editions, and the evidence of the parts adds up.
+//!
+//! The *anchors* of an edition, which other sheets of the map have or are near to, stay in place
+//! whatever its bases have, and vertices are attached to them likewise.
 
 use crate::{
     Error, Result,
@@ -20,25 +23,59 @@ use crate::{
     topology::{Settled, settle},
     vertices::VertexTable,
 };
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The editions of a map, the oldest first.
 pub struct Series<'a> {
-    editions: Vec<Edition<'a>>,
+    editions: Vec<Placed<'a>>,
     parameters: &'a Parameters,
 }
 
+/// An edition of a map.
+pub struct Edition<'a> {
+    /// The map.
+    pub map: Map<'a>,
+    /// The numbers of its bases. Where several have a vertex, the first one determines its place.
+    pub bases: Vec<usize>,
+    /// Canonical indices of the vertices that stay in place, ascending.
+    pub anchors: &'a [u32],
+}
+
+/// How the vertices of an edition are divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Census {
+    /// Vertices that move as in a base.
+    pub standing: usize,
+    /// Vertices that stay in place, as other sheets have them or are near.
+    pub anchored: usize,
+    /// Vertices that follow these.
+    pub attached: usize,
+    /// All others.
+    pub free: usize,
+}
+
 /// An edition among those before it.
-struct Edition<'a> {
+struct Placed<'a> {
     map: Map<'a>,
-    /// What the bases determine; `None` without bases.
+    rests_on_bases: bool,
+    /// What bases and anchors determine; `None` without any.
     changes: Option<Changes<'a>>,
+}
+
+/// Where a vertex comes from that does not move freely.
+#[derive(Clone, Copy)]
+enum Origin {
+    /// An edition and the index of the vertex there.
+    Base(usize, u32),
+    Anchor,
 }
 
 /// What an edition changes on its bases.
 struct Changes<'a> {
-    /// For every vertex that stands, the number of its edition and its index there.
-    origins: Vec<Option<(usize, u32)>>,
+    /// For every vertex that stands, what determines its place.
+    origins: Vec<Option<Origin>>,
     tree: VertexTree<'a>,
     placement: Placement<'a>,
     /// The constraints on the vertices that do not stand.
@@ -65,33 +102,40 @@ struct OwnPart {
 impl<'a> Series<'a> {
     /// Returns the series of a single map.
     pub fn of_one(map: Map<'a>, parameters: &'a Parameters) -> Self {
-        Series { editions: vec![Edition { map, changes: None }], parameters }
+        Series { editions: vec![Placed { map, rests_on_bases: false, changes: None }], parameters }
     }
 
-    /// Creates a series from maps, the oldest first, each with the numbers of its bases. Where
-    /// several bases have a vertex, the first one determines its place.
+    /// Creates a series from editions, the oldest first.
     ///
     /// # Errors
-    /// [`Error::PrecisionTooCoarse`].
-    pub fn new(maps: Vec<(Map<'a>, Vec<usize>)>, parameters: &'a Parameters) -> Result<Self> {
+    /// [`Error::PrecisionTooCoarse`], and [`Error::Anchors`] where anchors are none of the vertices.
+    pub fn new(editions: Vec<Edition<'a>>, parameters: &'a Parameters) -> Result<Self> {
         let mut series = Series { editions: Vec::new(), parameters };
-        for (map, bases) in maps {
-            let changes = match bases.is_empty() {
+        for edition in editions {
+            let Edition { map, ref bases, anchors } = edition;
+            let vertices = map.vertices.len();
+            if anchors.iter().any(|&v| v as usize >= vertices) {
+                return Err(Error::Anchors { vertices });
+            }
+            let changes = match bases.is_empty() && anchors.is_empty() {
                 true => None,
-                false => Some(Changes::new(map, series.origins(map, &bases), parameters)?),
+                false => Some(Changes::new(map, series.origins(&edition), parameters)?),
             };
-            series.editions.push(Edition { map, changes });
+            series.editions.push(Placed { map, rests_on_bases: !bases.is_empty(), changes });
         }
         Ok(series)
     }
 
-    fn origins(&self, map: Map, bases: &[usize]) -> Vec<Option<(usize, u32)>> {
+    fn origins(&self, Edition { map, bases, anchors }: &Edition) -> Vec<Option<Origin>> {
         let origin = |point: &[f64; 2]| {
-            let find =
-                |&base: &usize| Some((base, self.editions[base].map.vertices.index_of(*point)? as u32));
+            let find = |&base: &usize| {
+                Some(Origin::Base(base, self.editions[base].map.vertices.index_of(*point)? as u32))
+            };
             bases.iter().find_map(find)
         };
-        map.vertices.coords().iter().map(origin).collect()
+        let mut origins: Vec<Option<Origin>> = map.vertices.coords().iter().map(origin).collect();
+        anchors.iter().for_each(|&v| origins[v as usize] = Some(Origin::Anchor));
+        origins
     }
 
     /// Returns the newest map.
@@ -107,36 +151,51 @@ impl<'a> Series<'a> {
         self.editions.len()
     }
 
-    /// Returns the part of an edition as a map; `None` where it has too few vertices to be one.
-    fn part(&self, edition: usize) -> Option<Map<'_>> {
-        let Edition { map, changes } = &self.editions[edition];
-        let Some(Changes { part, .. }) = changes else { return Some(*map) };
+    /// Returns the part of an edition as a map.
+    fn part(&self, edition: usize) -> Map<'_> {
+        let Placed { map, changes, .. } = &self.editions[edition];
+        let Some(Changes { part, .. }) = changes else { return *map };
         let OwnPart { vertices, segments, polygon_roots, .. } = part;
-        (vertices.len() >= self.parameters.patch_size).then_some(Map {
-            vertices,
-            segments,
-            polygon_roots,
-            ..*map
-        })
+        Map { vertices, segments, polygon_roots, ..*map }
     }
 
-    /// Returns what `make` makes of the part of every edition that has one. A part of new vertices
-    /// on which no mesh can be built, or which has no room for the coefficients, is none.
+    /// Returns what `make` makes of the part of every edition that has one. New vertices are none
+    /// where they are too few, on one line, or have no room for the coefficients.
     pub(crate) fn parts<'s, T>(
         &'s self,
         make: impl Fn(Map<'s>) -> Result<T>,
     ) -> Result<Vec<(usize, Map<'s>, T)>> {
         let mut parts = Vec::new();
         for number in 0..self.editions.len() {
-            let Some(map) = self.part(number) else { continue };
-            match make(map) {
-                Ok(made) => parts.push((number, map, made)),
-                Err(Error::Collinear { .. } | Error::TooManySigns { .. })
-                    if self.editions[number].changes.is_some() => {}
-                Err(error) => return Err(error),
+            let (map, Placed { changes, rests_on_bases, .. }) = (self.part(number), &self.editions[number]);
+            let is_small = changes.is_some() && map.vertices.len() < self.parameters.patch_size;
+            match if is_small { None } else { Some(make(map)) } {
+                Some(Ok(made)) => parts.push((number, map, made)),
+                Some(Err(error)) if changes.is_none() || !is_of_small_part(&error) => return Err(error),
+                _ if !rests_on_bases => return Err(self.too_few_free(number)),
+                _ => {}
             }
         }
         Ok(parts)
+    }
+
+    fn too_few_free(&self, number: usize) -> Error {
+        let vertices = self.editions[number].map.vertices.len();
+        let patch_size = self.parameters.patch_size;
+        Error::TooFewFree { free: self.part(number).vertices.len(), vertices, patch_size }
+    }
+
+    /// Returns how the vertices of the newest map are divided; `None` where they are all free.
+    pub fn census(&self) -> Option<Census> {
+        let changes = self.editions.last()?.changes.as_ref()?;
+        let count = |is_meant: fn(&Origin) -> bool| {
+            changes.origins.iter().flatten().filter(|origin| is_meant(origin)).count()
+        };
+        let standing = count(|origin| matches!(origin, Origin::Base(..)));
+        let anchored = count(|origin| matches!(origin, Origin::Anchor));
+        let free = changes.part.indices.len();
+        let attached = changes.origins.len() - standing - anchored - free;
+        Some(Census { standing, anchored, attached, free })
     }
 
     /// Returns the patches of all parts on `map`, which has the vertices of all editions, and the
@@ -171,22 +230,27 @@ impl<'a> Series<'a> {
         before: &[Settled],
     ) -> Settled {
         match (&self.editions[number], groundwork) {
-            (Edition { map, changes: Some(changes) }, _) => changes.settle(*map, wanted, before),
+            (Placed { map, changes: Some(changes), .. }, _) => changes.settle(*map, wanted, before),
             (_, Some(groundwork)) => groundwork.settle(wanted),
-            (_, None) => unreachable!("an edition without bases is a part"),
+            (_, None) => unreachable!("an edition without bases and anchors is a part"),
         }
     }
 
     /// Returns how many vertices of the newest map hang on a segment, of which only those count that
-    /// do not stand; `None` without bases.
+    /// do not stand; `None` without bases and anchors.
     pub(crate) fn hanging(&self) -> Option<usize> {
         let changes = self.editions.last()?.changes.as_ref()?;
         Some(changes.constraints.junctions.hanging().len())
     }
 }
 
+/// Returns whether vertices of a part are on one line, or have no room for the coefficients.
+fn is_of_small_part(error: &Error) -> bool {
+    matches!(error, Error::Collinear { .. } | Error::TooManySigns { .. })
+}
+
 impl<'a> Changes<'a> {
-    fn new(map: Map<'a>, origins: Vec<Option<(usize, u32)>>, parameters: &Parameters) -> Result<Self> {
+    fn new(map: Map<'a>, origins: Vec<Option<Origin>>, parameters: &Parameters) -> Result<Self> {
         let (placement, tree) = (Placement::new(&map, parameters)?, VertexTree::of_all(&map));
         let stands: Vec<bool> = origins.iter().map(Option::is_some).collect();
         let (constraints, torn) = Constraints::around(&map, &tree, parameters.shape, &stands);
@@ -204,14 +268,17 @@ impl<'a> Changes<'a> {
     }
 
     fn settle(&self, map: Map, of_part: &[[f64; 2]], before: &[Settled]) -> Settled {
-        let place = |origin: &Option<(usize, u32)>| {
-            origin.map(|(edition, vertex)| before[edition].coords[vertex as usize])
+        let place = |(from, origin): (&[f64; 2], &Option<Origin>)| match *origin {
+            None => None,
+            Some(Origin::Base(edition, vertex)) => Some(before[edition].coords[vertex as usize]),
+            Some(Origin::Anchor) => Some(self.placement.place(*from, [0.0; 2])),
         };
-        let standing: Vec<Option<[f64; 2]>> = self.origins.iter().map(place).collect();
+        let from = map.vertices.coords();
+        let standing: Vec<Option<[f64; 2]>> = from.iter().zip(&self.origins).map(place).collect();
         let moved = |(from, to): (&[f64; 2], &Option<[f64; 2]>)| {
             to.map_or([0.0; 2], |to| [to[0] - from[0], to[1] - from[1]])
         };
-        let mut wanted: Vec<[f64; 2]> = map.vertices.coords().iter().zip(&standing).map(moved).collect();
+        let mut wanted: Vec<[f64; 2]> = from.iter().zip(&standing).map(moved).collect();
         self.part
             .indices
             .iter()

@@ -11,7 +11,7 @@ use meshmark_core::{
     map_data::{ChainKind, MapData},
     options::Parameters,
     orientation::orientation,
-    series::Series,
+    series::{Edition, Series},
     vertices::VertexTable,
 };
 use proptest::prelude::*;
@@ -109,8 +109,12 @@ fn on(data: &MapData) -> Map<'_> {
 
 /// The series of the first editions, each of which rests on all before it.
 fn series<'a>(editions: &'a [MapData], parameters: &'a Parameters) -> Series<'a> {
-    let maps = editions.iter().enumerate().map(|(number, data)| (on(data), (0..number).collect()));
-    Series::new(maps.collect(), parameters).unwrap()
+    let edition = |(number, data): (usize, &'a MapData)| Edition {
+        map: on(data),
+        bases: (0..number).collect(),
+        anchors: &[],
+    };
+    Series::new(editions.iter().enumerate().map(edition).collect(), parameters).unwrap()
 }
 
 fn copy(editions: &[MapData], recipient: &str) -> Vec<[f64; 2]> {

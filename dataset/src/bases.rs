@@ -1,17 +1,19 @@
-//! The bases of a marking: the earlier editions from which vertices stand, with their references.
+//! The bases of a marking: the earlier editions from which vertices stand, with their references, and
+//! the anchors by which the map fits other sheets.
 
-use crate::{Error, Result, Survey};
+use crate::{Error, Result, Survey, sheets};
 use meshmark_core::{
-    fingerprint_record::{BaseEntry, FingerprintRecord},
+    anchors::Anchors,
+    fingerprint_record::{BaseEntry, FingerprintRecord, PartEntry},
     ground::Ground,
     key::{SecretKey, read_text},
     map::Map,
     map_data::MapData,
     options::{Options, Parameters, join_list},
     recorded::Recorded,
-    series::Series,
+    series::{Census, Edition, Series},
 };
-use meshmark_marking::Crs;
+use meshmark_marking::{Crs, Lineage};
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
@@ -23,9 +25,10 @@ const SHARED: [&str; 6] = ["AMPLITUDE", "PATCH_SIZE", "TOLERANCE", "PRECISION", 
 /// Reads a reference as its entry describes it; returns nothing for a map without these layers.
 pub type ReadBase<'a, E> = dyn FnMut(&Path, &BaseEntry) -> std::result::Result<Option<Survey>, E> + 'a;
 
-/// The earlier editions from which vertices stand, the oldest first.
+/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors.
 #[derive(Default)]
 pub struct Bases {
+    anchors: Anchors,
     entries: Vec<BaseEntry>,
     references: Vec<BaseMap>,
 }
@@ -38,11 +41,11 @@ struct BaseMap {
 }
 
 impl Bases {
-    /// Reads the bases that options name, for a map that is to be marked with this key. `read`
-    /// reads a reference as its entry describes it.
+    /// Reads the bases and the plan of sheets that options name, for a map that is to be marked with
+    /// this key. `read` reads a reference as its entry describes it.
     ///
     /// # Errors
-    /// Fails on a record that is unreadable or of another key, mark or map, on a reference that is
+    /// Fails on a plan that the map is not in, on a record that is unreadable or of another key, mark or map, on a reference that is
     /// missing, and on the errors of `read`.
     pub fn of_options<E: From<Error>>(
         options: &Options,
@@ -50,10 +53,11 @@ impl Bases {
         map: &Survey,
         read: &mut ReadBase<'_, E>,
     ) -> std::result::Result<Self, E> {
+        let anchors = sheets::anchors(options, map)?;
         let Some(named) = &options.bases else {
             return match options.base_references {
                 Some(_) => Err(Error::NoBase.into()),
-                None => Ok(Bases::default()),
+                None => Ok(Bases { anchors, ..Bases::default() }),
             };
         };
         let mut entries: Vec<BaseEntry> = Vec::new();
@@ -75,20 +79,20 @@ impl Bases {
         }
         let references = options.base_references.as_ref().ok_or(Error::NoBaseReference)?;
         let references: Vec<PathBuf> = references.iter().map(PathBuf::from).collect();
-        let bases = Bases::find(entries, &references, read)?;
+        let bases = Bases::find((entries, anchors), &references, read)?;
         match bases.have_any_of(map) {
             true => Ok(bases),
             false => Err(Error::OtherBase { base: join_list(named) }.into()),
         }
     }
 
-    /// Finds the reference of every entry among these files; `read` returns nothing for a file that
-    /// lacks the layers of the entry.
+    /// Finds the reference of every entry among these files, for a map with these anchors; `read`
+    /// returns nothing for a file that lacks the layers of the entry.
     ///
     /// # Errors
     /// Fails on an entry without a reference, and on the errors of `read`.
     pub fn find<E: From<Error>>(
-        entries: Vec<BaseEntry>,
+        (entries, anchors): (Vec<BaseEntry>, Anchors),
         files: &[PathBuf],
         read: &mut ReadBase<'_, E>,
     ) -> std::result::Result<Self, E> {
@@ -120,7 +124,7 @@ impl Bases {
             Ok::<BaseMap, Error>(BaseMap { data: survey.data, ground })
         };
         let references = found.into_iter().flatten().map(of_survey).collect::<Result<_>>()?;
-        Ok(Bases { entries, references })
+        Ok(Bases { anchors, entries, references })
     }
 
     fn have_any_of(&self, map: &Survey) -> bool {
@@ -130,14 +134,14 @@ impl Bases {
         map.data.vertices.coords().iter().any(is_there)
     }
 
-    /// Returns whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+    /// Returns whether there are neither bases nor anchors, so that the map is one part.
+    pub fn are_none(&self) -> bool {
+        self.entries.is_empty() && self.anchors.is_empty()
     }
 
-    /// Returns what a record says about the bases.
-    pub fn entries(&self) -> &[BaseEntry] {
-        &self.entries
+    /// Returns what a record says about the bases, the anchors, and the parts that follow from them.
+    pub fn lineage(&self, parts: Vec<PartEntry>, census: Option<Census>) -> Lineage {
+        Lineage { parts, bases: self.entries.clone(), anchors: self.anchors.clone(), census }
     }
 
     /// Returns the series of the bases and a map that rests on them.
@@ -152,12 +156,18 @@ impl Bases {
         let number = |digest: &String| {
             self.entries.iter().position(|entry| entry.vertices_sha256 == *digest).expect("it was checked")
         };
-        let mut maps = Vec::new();
-        for (entry, BaseMap { data, ground }) in self.entries.iter().zip(&self.references) {
-            maps.push((data.on(ground, ground), entry.bases.iter().map(number).collect()));
-        }
-        maps.push((map, (0..self.entries.len()).collect()));
-        Series::new(maps, parameters)
+        let edition = |(entry, BaseMap { data, ground }): (&'a BaseEntry, &'a BaseMap)| Edition {
+            map: data.on(ground, ground),
+            bases: entry.bases.iter().map(number).collect(),
+            anchors: entry.anchors.as_slice(),
+        };
+        let mut editions: Vec<Edition> = self.entries.iter().zip(&self.references).map(edition).collect();
+        editions.push(Edition {
+            map,
+            bases: (0..self.entries.len()).collect(),
+            anchors: self.anchors.as_slice(),
+        });
+        Series::new(editions, parameters)
     }
 
     /// Returns a map with the vertices of its bases besides its own.
@@ -231,7 +241,8 @@ fn check_record(
         return Err(Error::BaseOfOtherMark { base: base(), option, made_with, given });
     }
     let whole = &record.reference.vertices_sha256;
-    if record.bases.is_empty() && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
+    let is_whole = record.bases.is_empty() && record.anchors.is_empty();
+    if is_whole && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
         return Err(Error::BaseOfOtherParts { base: base() });
     }
     match options.coefficients == recorded.coefficients {

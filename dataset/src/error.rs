@@ -39,6 +39,11 @@ pub enum Error {
     LostBase { vertices_sha256: String },
     OtherBase { base: String },
     BaseReferenceUnread { path: PathBuf, reason: String },
+    SheetsUnread { plan: String, source: io::Error },
+    SheetsMalformed { plan: String, source: meshmark_core::Error },
+    SheetsOfOtherTolerance { plan: String, made_with: f64, given: f64 },
+    SheetsInOtherCrs { plan: String, planned: String, own: String },
+    SheetNotPlanned { plan: String },
     Gdal(GdalError),
     Map(meshmark_marking::Error),
 }
@@ -86,8 +91,10 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Error::Reprojection { source, .. } => Some(source),
-            Error::File { source, .. } | Error::BaseUnread { source, .. } => Some(source),
-            Error::BaseMalformed { source, .. } => Some(source),
+            Error::File { source, .. }
+            | Error::BaseUnread { source, .. }
+            | Error::SheetsUnread { source, .. } => Some(source),
+            Error::BaseMalformed { source, .. } | Error::SheetsMalformed { source, .. } => Some(source),
             Error::Gdal(source) => Some(source),
             Error::Map(source) => Some(source),
             _ => None,
@@ -135,12 +142,16 @@ impl Error {
                 | Error::BaseInOtherCrs { .. }
                 | Error::BaseOfOtherMark { .. }
                 | Error::BaseOfOtherVersion { .. }
+                | Error::SheetNotPlanned { .. }
+                | Error::SheetsInOtherCrs { .. }
+                | Error::SheetsOfOtherTolerance { .. }
         )
     }
 
     /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
         let base = |path: &Path| spelling.value("BASE", path.display());
+        let sheets = |plan: &str| spelling.value("SHEETS", plan);
         match self {
             Error::NoLayers => "the map has no vector layer: give a vector dataset that GDAL can open".into(),
             Error::UnknownLayer { name, known } => {
@@ -248,7 +259,7 @@ impl Error {
                 )
             }
             Error::ContradictingBase { base: path } => format!(
-                "{} has an edition that another base has with other layers or bases, so its vertices have two places: name \
+                "{} has an edition that another base has with other layers, anchors or bases, so its vertices have two places: name \
                  one of them",
                 base(path)
             ),
@@ -268,6 +279,30 @@ impl Error {
             Error::BaseReferenceUnread { path, reason } => {
                 format!("{} cannot be read: {reason}", spelling.value("BASE_REFERENCE", path.display()))
             }
+            Error::SheetsUnread { plan, source } => {
+                format!("{} cannot be read ({source}): name a plan that `meshmark plan` wrote", sheets(plan))
+            }
+            Error::SheetsMalformed { plan, source } => {
+                format!("{} is no plan: {}", sheets(plan), source.text(spelling))
+            }
+            Error::SheetsOfOtherTolerance { plan, made_with, given } => format!(
+                "{} was made with {}, and this sheet is marked with {}: make a plan with the {} of the mark",
+                sheets(plan),
+                spelling.value("TOLERANCE", made_with),
+                spelling.value("TOLERANCE", given),
+                spelling.name("TOLERANCE")
+            ),
+            Error::SheetsInOtherCrs { plan, planned, own } => format!(
+                "{} is of sheets in another CRS ({planned}) than this map ({own}): mark sheets in the CRS in which they \
+                 were planned",
+                sheets(plan)
+            ),
+            Error::SheetNotPlanned { plan } => format!(
+                "{} has no sheet with the vertices of this map: plan all sheets again if one of them has changed, with \
+                 the {} that are marked",
+                sheets(plan),
+                spelling.name("LAYERS")
+            ),
             Error::Gdal(error) => error.to_string(),
             Error::Map(error) => error.text(spelling),
         }

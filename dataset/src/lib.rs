@@ -25,6 +25,7 @@ pub mod publication;
 pub mod read_back;
 mod read_geometry;
 mod selection;
+mod sheets;
 mod survey;
 mod threads;
 pub mod traces;

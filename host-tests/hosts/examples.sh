@@ -23,13 +23,18 @@ GDAL_DRIVER_PATH=$wheel/gdalplugins run geopandas_export.py \
 verify "geopandas_export.py" exported.reference.gpkg exported.gpkg --record exported.json
 
 mkdir sheets
-cp "$root/fixtures/kotka.gpkg" "$root/fixtures/helsinki.gpkg" sheets/
-run mark_folder.sh "$examples/mark_folder.sh" sheets key.json "ACME GmbH" marked
-for sheet in kotka helsinki; do
-    verify "mark_folder.sh" "marked/$sheet.reference.gpkg" "marked/$sheet.gpkg" --record "marked/$sheet.json"
+PATH=$(dirname "$meshmark"):$PATH
+ogr2ogr -spat 385000 6671000 385820 6673000 sheets/west.gpkg "$root/fixtures/helsinki.gpkg"
+ogr2ogr -spat 385820 6671000 387000 6673000 sheets/east.gpkg "$root/fixtures/helsinki.gpkg"
+run mark_folder.sh "$examples/mark_folder.sh" sheets key.json "ACME GmbH" marked private
+for sheet in west east; do
+    verify "mark_folder.sh" "private/$sheet.gpkg" "marked/$sheet.gpkg" --record "private/$sheet.json"
 done
-run "mark_folder.sh again" "$examples/mark_folder.sh" sheets key.json "ACME GmbH" marked
-! "$examples/mark_folder.sh" sheets key.json "ACME GmbH" sheets/. 2>"$work/log" || fail "mark_folder.sh takes sheets for copies"
+[ "$(ls marked)" = $'east.gpkg\nwest.gpkg' ] || fail "mark_folder.sh puts more than copies to the copies"
+run "mark_folder.sh again" "$examples/mark_folder.sh" sheets key.json "ACME GmbH" marked private
+for folders in "sheets/. private" "marked sheets/." "marked marked/."; do
+    ! "$examples/mark_folder.sh" sheets key.json "ACME GmbH" $folders 2>"$work/log" || fail "mark_folder.sh takes $folders"
+done
 
 cp "$examples/mapserver.map" .
 printf 'CONFIG\n  ENV\n    MS_MAP_PATTERN "."\n  END\nEND\n' >mapserver.conf

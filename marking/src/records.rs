@@ -5,6 +5,7 @@ use crate::{
     quality::{BeforeAfter, Geos, Outlines, Quality, State},
 };
 use meshmark_core::{
+    anchors::Anchors,
     embedding::Marked,
     fingerprint_record::{
         self, BaseEntry, CopyEntry, FingerprintRecord, FingerprintShape, PartEntry, ReferenceEntry,
@@ -15,6 +16,7 @@ use meshmark_core::{
     options::{Options, Parameters, Subject},
     record::{self, Distortion, Record, Reference, TopologyEntry},
     recorded::Recorded,
+    series::Census,
     vertices::VertexTable,
 };
 use std::borrow::Cow;
@@ -83,13 +85,18 @@ fn outlines<'a>(
     Outlines { count: geometries.len(), get }
 }
 
-/// The parts of a fingerprint, and the editions that the map rests on.
+/// The parts of a fingerprint, and what determines them: the editions that the map rests on, and its
+/// anchors.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Lineage {
     /// The parts of the map and its bases; none of a message.
     pub parts: Vec<PartEntry>,
     /// The bases.
     pub bases: Vec<BaseEntry>,
+    /// The vertices that stay in place.
+    pub anchors: Anchors,
+    /// How the vertices are divided, where they are not all free.
+    pub census: Option<Census>,
 }
 
 /// Returns the record of a marking, a fingerprint or a message as the options have it.
@@ -153,7 +160,8 @@ pub fn fingerprint_record(
     (reference, lineage): (Reference, Lineage),
     distortion: Distortion,
 ) -> FingerprintRecord {
-    let (Reference { vertices, vertices_sha256, crs, .. }, Lineage { parts, bases }) = (reference, lineage);
+    let (Reference { vertices, vertices_sha256, crs, .. }, lineage) = (reference, lineage);
+    let Lineage { parts, bases, anchors, census } = lineage;
     FingerprintRecord {
         meshmark_record: fingerprint_record::VERSION,
         software: SOFTWARE.into(),
@@ -166,6 +174,8 @@ pub fn fingerprint_record(
         copy: CopyEntry { file_sha256: None },
         parts,
         bases,
+        anchors,
+        census,
         distortion,
     }
 }

@@ -11,7 +11,7 @@ use meshmark_core::{
     demodulation,
     embedding::{self, Marked},
     fingerprint::{self, FingerprintEmbedding},
-    fingerprint_record::{BaseEntry, PartEntry},
+    fingerprint_record::BaseEntry,
     key::{SecretKey, read_text},
     map::Map,
     options::{Options, Spelling, Subject},
@@ -72,9 +72,8 @@ impl MarkingRequest {
                 return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
-        let of_bases = [("BASE", &options.bases), ("BASE_REFERENCE", &options.base_references)];
-        for (option, paths) in of_bases {
-            output::check_is_not_base(option, paths.as_deref().unwrap_or_default())?;
+        for (option, paths) in inputs(&options) {
+            output::check_is_not_input(option, paths)?;
         }
         Ok(MarkingRequest { options, subject, key, key_path, exposed })
     }
@@ -89,15 +88,16 @@ impl MarkingRequest {
         }
     }
 
-    /// Marks a map on its bases; returns the parts of a fingerprint, too.
-    fn embed(&self, map: Map, bases: &Bases) -> meshmark_core::Result<(Marked, Vec<PartEntry>)> {
+    /// Marks a map on its bases; returns the lineage of a fingerprint, too.
+    fn embed(&self, map: Map, bases: &Bases) -> meshmark_core::Result<(Marked, Lineage)> {
         let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = self;
         match (coefficients, subject) {
             (Some(coefficients), Subject::Recipient(recipient)) => {
                 let series = bases.series(map, parameters)?;
-                fingerprint::embed(&series, key, recipient, *coefficients)
+                let (marked, parts) = fingerprint::embed(&series, key, recipient, *coefficients)?;
+                Ok((marked, bases.lineage(parts, series.census())))
             }
-            _ => Ok((embedding::embed(&map, key, &subject.carried(key), parameters)?, Vec::new())),
+            _ => Ok((embedding::embed(&map, key, &subject.carried(key), parameters)?, Lineage::default())),
         }
     }
 
@@ -106,20 +106,26 @@ impl MarkingRequest {
         self.options.record_path.as_deref().map(Path::new)
     }
 
-    /// Returns the option that names this file as a base or the reference of one.
-    pub fn base_at(&self, path: &Path) -> Option<&'static str> {
-        let Options { bases, base_references, .. } = &self.options;
-        let names = |paths: &Option<Vec<String>>| {
-            paths.iter().flatten().any(|named| same_file(Path::new(named), path))
-        };
-        let of_option = [("BASE", bases), ("BASE_REFERENCE", base_references)];
-        of_option.into_iter().find(|(_, paths)| names(paths)).map(|(option, _)| option)
+    /// Returns the option that names this file as an input of the marking beside its source.
+    pub fn input_at(&self, path: &Path) -> Option<&'static str> {
+        let names = |paths: &[String]| paths.iter().any(|named| same_file(Path::new(named), path));
+        inputs(&self.options).into_iter().find(|(_, paths)| names(paths)).map(|(option, _)| option)
     }
 
     /// Returns the path of the key file.
     pub fn key_path(&self) -> &Path {
         Path::new(&self.key_path)
     }
+}
+
+/// Returns the files of a series that options name, by their option.
+fn inputs(options: &Options) -> [(&'static str, &[String]); 3] {
+    let Options { bases, base_references, sheets, .. } = options;
+    [
+        ("BASE", bases.as_deref().unwrap_or_default()),
+        ("BASE_REFERENCE", base_references.as_deref().unwrap_or_default()),
+        ("SHEETS", sheets.as_slice()),
+    ]
 }
 
 fn pool(threads: usize) -> Result<ThreadPool> {
@@ -188,7 +194,7 @@ impl Marking {
         };
         let bases = Bases::of_options(options, &request.key, &map, &mut read)?;
         let pool = pool(threads)?;
-        let (marked, parts) = pool.install(|| request.embed(on_ground, &bases))?;
+        let (marked, lineage) = pool.install(|| request.embed(on_ground, &bases))?;
         let parameters = &options.parameters;
         let distortion = map.geometries.as_ref().map(|geometries| {
             pool.install(|| {
@@ -200,7 +206,6 @@ impl Marking {
         let damage = damage_warning(parameters, &marked.angles, areas, spelling);
         let record = distortion.map(|distortion| {
             let reference = marking::reference(&map.data.vertices, map.crs(), marked.patches);
-            let lineage = Lineage { parts, bases: bases.entries().to_vec() };
             marking::recorded(options, &request.subject, &request.key, (reference, lineage), distortion)
         });
         map.geometries = None;

@@ -32,10 +32,11 @@ pub fn check_is_not_record(record: &str) -> Result<()> {
     }
 }
 
-/// Fails when this process is an ogr2ogr whose target is a base or its reference, which `option` names.
-pub fn check_is_not_base(option: &'static str, paths: &[String]) -> Result<()> {
-    let is_base = |path: &Path| paths.iter().any(|base| same_place(path, Path::new(base)));
-    match target(&arguments(), is_base) {
+/// Fails when this process is an ogr2ogr whose target is another input of the marking, which `option`
+/// names.
+pub fn check_is_not_input(option: &'static str, paths: &[String]) -> Result<()> {
+    let is_input = |path: &Path| paths.iter().any(|input| same_place(path, Path::new(input)));
+    match target(&arguments(), is_input) {
         Some(_) => Err(Error::SameFile { option, other: "the output" }),
         None => Ok(()),
     }

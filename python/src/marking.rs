@@ -86,7 +86,7 @@ fn marked(
     let mut warnings = marking::warnings(options, message.as_ref(), described, marked.patches, spelling);
     warnings.extend(damage_warning(parameters, &marked.angles, Some(&distortion.areas), spelling));
     let reference = marking::reference(described.0, described.1, marked.patches);
-    let lineage = Lineage { parts, bases: Vec::new() };
+    let lineage = Lineage { parts, ..Lineage::default() };
     let record = marking::recorded(options, subject, key, (reference, lineage), distortion);
     let moves = Moves { from: &map.data.vertices, to: &marked.coords };
     let moved = layers.iter().map(|layer| layer.moved(&moves)).collect::<marking::Result<_>>()?;

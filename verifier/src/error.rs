@@ -82,6 +82,31 @@ pub enum Error {
         folder.display()
     )]
     NoRecord { folder: PathBuf },
+    #[error(
+        "the folder {} has no sheet in a format that marked maps are written to: name a folder of such files, or the \
+         files themselves",
+        folder.display()
+    )]
+    NoSheet { folder: PathBuf },
+    #[error(
+        "the sheets {} ({}) and {} ({}) are not in the same CRS: bring all sheets into one CRS first",
+        paths[0].display(), names[0], paths[1].display(), names[1]
+    )]
+    SheetsOfOtherCrs { paths: [PathBuf; 2], names: [String; 2] },
+    #[error(
+        "the sheets {} and {} have the same vertices: leave one of them out",
+        paths[0].display(), paths[1].display()
+    )]
+    SameSheet { paths: [PathBuf; 2] },
+    #[error(
+        "the sheets {} and {} disagree on {}, for example ({}, {}) in one and ({}, {}) in the other: make both from one \
+         source, in which these have the same coordinates to the last digit",
+        paths[0].display(), paths[1].display(), counted(*vertices, "vertex"),
+        places[0][0], places[0][1], places[1][0], places[1][1]
+    )]
+    SheetsDisagree { paths: [PathBuf; 2], places: [[f64; 2]; 2], vertices: usize },
+    #[error("the sheet {} was changed while it was planned: plan again when nobody writes to it", path.display())]
+    SheetChanged { path: PathBuf },
     #[error("the folder {} has no record (*.json): give the folder the records were written to", folder.display())]
     NothingListed { folder: PathBuf },
     #[error("--time-stamp-request has nothing to answer it: give the response to it with --time-stamp")]
@@ -135,7 +160,7 @@ pub enum Error {
     )]
     OtherParts { parts: usize },
     #[error(
-        "the {} of the record are not those of its reference and its bases: give the files of all editions, unchanged, or \
+        "the {} of the record are not those of its reference, its bases and its anchors: give the files of all editions, unchanged, or \
          verify with the version of meshmark that wrote it",
         counted(*parts, "part")
     )]
@@ -336,6 +361,9 @@ impl Error {
             | OtherParts { .. }
             | OtherPartsOfBases { .. }
             | OtherMessage
+            | SheetsOfOtherCrs { .. }
+            | SameSheet { .. }
+            | SheetsDisagree { .. }
             | OtherReference { .. }
             | NoReferenceOfRecord { .. } => ExitCode::DoesNotBelong,
             Unopened { .. }
@@ -344,6 +372,7 @@ impl Error {
             | Undigested { .. }
             | NoFile { .. }
             | SuspectChanged { .. }
+            | SheetChanged { .. }
             | NoOption { .. }
             | OtherTables { .. }
             | Unread { .. }

@@ -2,7 +2,7 @@
 //!
 //! The data flows one way: [`inputs`] → [`verify`](mod@verify), which passes numbers to
 //! `meshmark-detection` → [`report`] → [`html`] → [`outputs`]. [`compare`] measures the effect of marking on a
-//! map, [`distribute`] marks a map for many recipients,
+//! map, [`distribute`] marks a map for many recipients, [`sheets`] plans sheets that are marked apart,
 //! [`copies_index`] lists who received which copy. [`confinement`] has the process that examines a
 //! suspect.
 #![forbid(unsafe_code)]
@@ -19,6 +19,7 @@ pub mod inputs;
 pub mod outputs;
 pub mod progress;
 pub mod report;
+pub mod sheets;
 mod thinning;
 pub mod time_stamp;
 pub mod verify;

@@ -166,14 +166,20 @@ fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
     second["vertices_sha256"] = json!("cd".repeat(32));
     second["bases"] = json!(["ab".repeat(32)]);
     second["layers"] = json!(["roads"]);
+    second["anchors"] = json!("3");
     record["bases"] = json!([first, second]);
+    record["anchors"] = json!("0 3");
+    record["census"] = json!({ "standing": 1, "anchored": 2, "attached": 0, "free": 9 });
     assert_valid("record-2", &record);
     assert!(FingerprintRecord::from_json(&record.to_string()).is_ok());
-    assert_closed("record-2", &record, &["/bases/1"]);
+    assert_closed("record-2", &record, &["/bases/0", "/census"]);
     let changes = [
         ("/meshmark_record", json!(1)),
         ("/bases/0/vertices_sha256", json!("00")),
         ("/bases/1/bases", json!(["AB"])),
+        ("/bases/1/anchors", json!("3,4")),
+        ("/anchors", json!("-1")),
+        ("/census/free", json!(-1)),
         ("/recipient", json!(" ")),
         ("/key_commitment", json!("434471506306423b")),
         ("/mark/amplitude_m", json!(0)),

@@ -47,6 +47,8 @@ pub struct Options {
     pub bases: Option<Vec<String>>,
     /// Their references, and those of their own bases, in any order.
     pub base_references: Option<Vec<String>>,
+    /// Path of the plan of the sheets of which the map is one.
+    pub sheets: Option<String>,
 }
 
 impl Options {
@@ -71,9 +73,10 @@ impl Options {
         };
         let code = values.choice("CODE", Code::from_name)?.unwrap_or(Code::default_for(bits));
         code.channel_bits(bits)?;
-        let bases = values.list("BASE")?;
-        if bases.is_some() && subject.is_some() && !is_fingerprint {
-            return Err(Error::BaseOfMessage);
+        let is_message = subject.is_some() && !is_fingerprint;
+        let of_fingerprint = ["BASE", "SHEETS"].into_iter().find(|name| values.given(name).is_some());
+        if let Some(option) = of_fingerprint.filter(|_| is_message) {
+            return Err(Error::OfMessage { option });
         }
         Ok(Options {
             key_path: values.text("KEY")?,
@@ -94,8 +97,9 @@ impl Options {
             refuses_traces: values.choice("ATTRIBUTES", refuses)?.expect("has a default"),
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
-            bases,
+            bases: values.list("BASE")?,
             base_references: values.list("BASE_REFERENCE")?,
+            sheets: values.text("SHEETS")?,
         })
     }
 
@@ -134,6 +138,7 @@ impl Options {
             "RECORD" => self.record_path.clone(),
             "BASE" => self.bases.as_ref().map(join_list),
             "BASE_REFERENCE" => self.base_references.as_ref().map(join_list),
+            "SHEETS" => self.sheets.clone(),
             _ => panic!("{option} is no option"),
         }
     }
@@ -247,13 +252,17 @@ mod tests {
             ("SRS", "EPSG:3067"),
             ("RECORD", "acme.json"),
         ];
-        let of_base = [("BASE", r#"may.json,"June, July""#), ("BASE_REFERENCE", "may.gpkg")];
+        let of_base = [
+            ("BASE", r#"may.json,"June, July""#),
+            ("BASE_REFERENCE", "may.gpkg"),
+            ("SHEETS", "plan, \"A\".json"),
+        ];
         let of_message = ["CODE", "CHIP_RATE"];
         for subject in [("RECIPIENT", " ACME, \"GmbH\""), ("MESSAGE", "C0ffee")] {
             let mut given = [&all[..], &of_base, &[subject]].concat();
             match subject.0 {
                 "RECIPIENT" => given.retain(|(name, _)| !of_message.contains(name)),
-                _ => given.retain(|(name, _)| *name != "BASE"),
+                _ => given.retain(|(name, _)| !["BASE", "SHEETS"].contains(name)),
             }
             for options in [marking(&given), marking(&[]), marking(&[subject])] {
                 let texts = OPTIONS.iter().filter_map(|o| Some((o.name, options.text_of(o.name)?)));
@@ -286,8 +295,10 @@ mod tests {
         assert!(error(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).contains("exactly one"));
         assert!(error(&[("MESSAGE", "xyz")]).contains("hexadecimal"));
         assert!(error(&[("LAYERS", "a,,b")]).contains("empty name"));
-        let of_message = error(&[("BASE", "a.json"), ("MESSAGE", "00")]);
-        assert!(of_message.contains("BASE is for fingerprints"), "{of_message}");
+        for option in ["BASE", "SHEETS"] {
+            let of_message = error(&[(option, "a.json"), ("MESSAGE", "00")]);
+            assert!(of_message.contains(&format!("{option} is for fingerprints")), "{of_message}");
+        }
         assert!(
             error(&[("LAYERS", r#""a,b"#)]).contains(r#"LAYERS="a,b has a double quote that is not closed"#)
         );

@@ -208,6 +208,14 @@ pub const OPTIONS: &[OptionSpec] = &[
         false,
         "Comma-separated references of those editions and of the editions that they rest on, in any order",
     ),
+    row(
+        "SHEETS",
+        Kind::Text,
+        None,
+        false,
+        "Plan of the sheets of which this map is one, made by `meshmark plan`: they are marked apart and fit together; \
+         for fingerprints alone",
+    ),
 ];
 
 /// The further options of a driver that writes, in the order of the docs.

@@ -64,6 +64,13 @@ pub(super) enum Subcommands {
     /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable map, 6 too
     /// large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
+    /// Plan the sheets of a map, so that they are marked apart and fit together
+    ///
+    /// Sheets that are marked with --sheets, or SHEETS of the driver, agree on every vertex and line that
+    /// they share, whoever marks them, when and in which order. Plan all sheets together, before any of
+    /// them is marked, and again when one changes. Exit codes: 0 written, 2 usage, 4 sheets that do not
+    /// belong together, 5 unreadable sheet, 6 too large, 7 the plan cannot be written.
+    Plan(PlanArgs),
     /// List who received which copy, from the records of a folder
     ///
     /// The table is CSV: recipient, edition (SHA-256 of the vertices of the unmarked map), number of
@@ -188,6 +195,25 @@ pub(super) struct DistributeArgs {
     pub(super) map: PathBuf,
     #[command(flatten)]
     pub(super) marking: DistributeFlags,
+}
+
+#[derive(Args)]
+pub(super) struct PlanArgs {
+    /// The sheets, unmarked, or folders of them
+    #[arg(required = true)]
+    pub(super) sheets: Vec<PathBuf>,
+    /// The plan to write; it must not exist
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Comma-separated layers that are marked, those with a comma in double quotes; all by default
+    #[arg(long)]
+    pub(super) layers: Option<String>,
+    /// CRS of sheets that have none, for example EPSG:3067
+    #[arg(long)]
+    pub(super) srs: Option<String>,
+    /// The tolerance with which the sheets are marked, metres on the ground [default: 0.75]
+    #[arg(long, allow_negative_numbers = true)]
+    pub(super) tolerance: Option<String>,
 }
 
 #[derive(Args)]
@@ -335,7 +361,7 @@ pub(super) struct MarkingFlags(pub(super) Vec<(&'static str, String)>);
 pub(super) struct DistributeFlags(pub(super) Vec<(&'static str, String)>);
 
 /// Options that shape no mark by themselves, and concern those who distribute.
-const OF_DISTRIBUTE: [&str; 3] = ["ATTRIBUTES", "BASE", "BASE_REFERENCE"];
+const OF_DISTRIBUTE: [&str; 4] = ["ATTRIBUTES", "BASE", "BASE_REFERENCE", "SHEETS"];
 
 const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
 

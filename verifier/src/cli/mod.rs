@@ -9,16 +9,17 @@ mod request;
 mod verification;
 
 use crate::package_files;
-use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands};
+use arguments::{Cli, CompareArgs, DistributeArgs, PlanArgs, Subcommands};
 use clap::{CommandFactory, Parser};
-use meshmark_core::{counted, options::Options};
+use meshmark_core::{counted, options::Options, sheet_plan::PlannedSheet};
 use meshmark_verifier::{
     Error, Result,
     compare::{Comparison, Details, compare, detail::ComparedFiles},
     copies_index, distribute, html,
     inputs::{gdal_failures, texts},
-    outputs::{Format, ReportFile},
+    outputs::{Format, NewFile, ReportFile},
     progress::Progress,
+    sheets,
 };
 use printing::{print, warn, warn_of_displacements};
 use std::path::Path;
@@ -37,6 +38,7 @@ pub fn run() -> u8 {
         Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
         Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
         Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),
+        Subcommands::Plan(args) => plan_sheets(&args).map(|()| DONE),
         Subcommands::Records { folder } => list_copies(&folder).map(|()| DONE),
     };
     result.unwrap_or_else(|error| {
@@ -97,6 +99,23 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     };
     print(&format!("{} written to {}{before}\n", counted(done.written, "copy"), request.folder.display()))?;
     Ok(())
+}
+
+fn plan_sheets(args: &PlanArgs) -> Result<()> {
+    let PlanArgs { sheets: named, output, layers, srs, tolerance } = args;
+    let file = NewFile::new("plan", output)?;
+    let flags = [("LAYERS", layers), ("SRS", srs), ("TOLERANCE", tolerance)];
+    let given = flags.iter().filter_map(|(name, value)| Some((*name, value.as_deref()?)));
+    let plan = sheets::plan(&Options::parse_for_recipients(given)?, named, &mut Progress::default())?;
+    file.write(plan.to_json().as_bytes())?;
+    let count = |number: fn(&PlannedSheet) -> usize| plan.sheets.iter().map(number).sum::<usize>();
+    print(&format!(
+        "plan of {} written to {}: {} of {} stay in place\n",
+        counted(plan.sheets.len(), "sheet"),
+        output.display(),
+        count(|sheet| sheet.anchors.as_slice().len()),
+        counted(count(|sheet| sheet.vertices), "vertex")
+    ))
 }
 
 fn list_copies(folder: &Path) -> Result<()> {

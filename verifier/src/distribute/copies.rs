@@ -95,12 +95,13 @@ impl MarkedCopy {
     ) -> bool {
         let text = fs::read_to_string(&self.record).ok();
         let Some(found) = text.and_then(|text| Recorded::from_json(&text).ok()) else { return false };
-        // The parts follow from the map, its bases and the options.
-        let (patches, parts, distortion) = match &found {
-            Recorded::Message(record) => (record.reference.patches, Vec::new(), record.distortion()),
-            Recorded::Fingerprint(record) => (0, record.parts.clone(), record.distortion),
+        // Parts and census follow from the map, its bases, its anchors and the options.
+        let (patches, lineage, distortion) = match &found {
+            Recorded::Message(record) => (record.reference.patches, Lineage::default(), record.distortion()),
+            Recorded::Fingerprint(record) => {
+                (0, bases.lineage(record.parts.clone(), record.census), record.distortion)
+            }
         };
-        let lineage = Lineage { parts, bases: bases.entries().to_vec() };
         let reference = (Reference { patches, ..reference.clone() }, lineage);
         match (marking::recorded(options, &self.subject(), key, reference, distortion), found) {
             (Recorded::Message(expected), Recorded::Message(found)) => {

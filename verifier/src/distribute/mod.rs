@@ -33,7 +33,7 @@ use meshmark_core::options::Spelling;
 use meshmark_dataset::{
     Bases, GeosOfGdal, Survey, file_digest, formats::Format, threads, workplace::Workplace,
 };
-use meshmark_marking::{self as marking, Lineage, ThreadPool, Unmarked};
+use meshmark_marking::{self as marking, ThreadPool, Unmarked};
 use staging::Stage;
 use std::{
     fs,
@@ -125,7 +125,7 @@ fn run(
     let described = (&survey.data.vertices, survey.crs());
     let warnings = marking::warnings(options, message.as_ref(), described, marks.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
-    let lineage = Lineage { parts: marks.part_entries(), bases: bases.entries().to_vec() };
+    let lineage = bases.lineage(marks.part_entries(), series.census());
     let reference = (marking::reference(&survey.data.vertices, survey.crs(), marks.patches()), lineage);
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
     let unmarked = pool.install(|| Unmarked::new(geometries, &map, &GeosOfGdal));

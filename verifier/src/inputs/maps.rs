@@ -41,6 +41,15 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, dataset, reading)
 }
 
+/// Reads a sheet of a map, unmarked.
+pub fn sheet(path: &Path, reading: &Reading) -> Result<Survey> {
+    if marked_view::is_named_by(path) {
+        return Err(Error::MarkedView { path: path.into() });
+    }
+    let Opened { dataset, .. } = &open_untouched("sheet", path)?;
+    read("sheet", path, dataset, reading)
+}
+
 /// Reads the reference of an edition; nothing where a map lacks its layers.
 pub fn base_reference(path: &Path, entry: &BaseEntry) -> Result<Option<Survey>> {
     let (layers, srs) = (entry.layers.as_deref(), entry.srs.as_deref());

@@ -136,13 +136,13 @@ pub fn examine(
     let suspect_crs = suspect.layer_crs.clone();
     progress.start("patches", 0);
     let digest = reference.data.vertices.digest();
-    let united = (!bases.is_empty()).then(|| bases.united(reference)).transpose()?;
+    let united = (!bases.are_none()).then(|| bases.united(reference)).transpose()?;
     let reference = united.as_ref().unwrap_or(reference);
     let compared = match compared(request, map, (reference, bases)) {
         Ok(compared) => compared,
         Err(error) => return Ok(unfit(error)), // this comes before the search for the map
     };
-    if !bases.is_empty() && !has_parts(&compared, &request.lineage.parts) {
+    if !bases.are_none() && !has_parts(&compared, &request.lineage.parts) {
         return Ok(Suited::No(Error::OtherPartsOfBases { parts: request.lineage.parts.len() }));
     }
     let Registered { map: suspect, registration } =

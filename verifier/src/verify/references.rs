@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{Error, Result, inputs::maps, progress::Progress};
 use meshmark_dataset::{Bases, Survey};
+use meshmark_marking::Lineage;
 use std::path::PathBuf;
 
 /// Reads the only reference, or that of several from which the record of the request was made.
@@ -40,10 +41,11 @@ pub fn read_own_reference(
     Err(Error::NoReferenceOfRecord { references: references.len() })
 }
 
-/// Finds the editions that the record of a request rests on among the references.
+/// Finds the editions that the record of a request rests on among the references, and takes its anchors.
 ///
 /// # Errors
 /// Fails when a reference is unreadable, and when one is missing.
 pub fn read_bases(request: &Request, references: &[PathBuf]) -> Result<Bases> {
-    Bases::find(request.lineage.bases.clone(), references, &mut maps::base_reference)
+    let Lineage { bases, anchors, .. } = request.lineage.clone();
+    Bases::find((bases, anchors), references, &mut maps::base_reference)
 }

@@ -2,6 +2,7 @@
 
 use crate::inputs::{private_copy::PrivateCopy, texts::ReadRecord};
 use meshmark_core::{
+    fingerprint_record::FingerprintRecord,
     key::SecretKey,
     options::{Parameters, Subject},
     recorded::Recorded,
@@ -60,8 +61,8 @@ pub struct Request {
     pub subject: Option<Subject>,
     /// What the mark carries.
     pub sought: Sought,
-    /// The parts of the fingerprint and the editions that it rests on, from a record that names
-    /// some.
+    /// The parts of the fingerprint, the editions that it rests on and its anchors, from a record that
+    /// names some.
     pub lineage: Lineage,
     /// Number of the marks that are tried, this one included, as nobody recorded which it is.
     pub tried: usize,
@@ -90,11 +91,12 @@ pub struct Request {
     pub exact_displacements: bool,
 }
 
-/// Returns the lineage of a record that rests on earlier editions.
+/// Returns the lineage of a record that rests on earlier editions or has anchors.
 pub fn lineage_of(record: &Recorded) -> Lineage {
     match record {
-        Recorded::Fingerprint(record) if !record.bases.is_empty() => {
-            Lineage { parts: record.parts.clone(), bases: record.bases.clone() }
+        Recorded::Fingerprint(record) if !record.bases.is_empty() || !record.anchors.is_empty() => {
+            let FingerprintRecord { parts, bases, anchors, census, .. } = record.clone();
+            Lineage { parts, bases, anchors, census }
         }
         _ => Lineage::default(),
     }
