@@ -14,23 +14,24 @@ use zeroize::{Zeroize, ZeroizeOnDrop, Zeroizing};
 
 const VERSION: u32 = 1;
 
-/// A key file has 150 bytes and a record a few thousand; a mistaken /dev/zero has no end.
-const LONGEST_TEXT: u64 = 1 << 20;
+/// A key file has 150 bytes and a record a few thousand, but the anchors of the sheets of a country take
+/// some ten million; a mistaken /dev/zero has no end.
+const LONGEST_TEXT: u64 = 1 << 26;
 /// This many bytes are reserved for a text: a buffer that grows would leave copies of a secret
 /// behind.
 const USUAL_TEXT: usize = 1024;
 
-/// Reads the text of a key file or a record.
+/// Reads the text of a key file, a record or a plan of sheets.
 ///
 /// # Errors
-/// Fails when `source` fails, on bytes that are not UTF-8, and on more than 1 MiB.
+/// Fails when `source` fails, on bytes that are not UTF-8, and on more than 64 MiB.
 pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     let mut text = Zeroizing::new(String::with_capacity(USUAL_TEXT));
     source.take(LONGEST_TEXT + 1).read_to_string(&mut text)?;
     match text.len() as u64 {
         0..=LONGEST_TEXT => Ok(text),
         _ => {
-            Err(io::Error::other(format!("it is longer than the {LONGEST_TEXT} bytes of any key or record")))
+            Err(io::Error::other(format!("it is longer than the {LONGEST_TEXT} bytes of any key, record or plan")))
         }
     }
 }
@@ -255,7 +256,7 @@ mod tests {
     fn a_text_is_read_to_its_end_or_refused() {
         let text = "ä".repeat(1 << 19);
         assert_eq!(*read_text(text.as_bytes()).unwrap(), text);
-        for (endless, reason) in [(b' ', "longer than the 1048576 bytes"), (0xff, "UTF-8")] {
+        for (endless, reason) in [(b' ', "longer than the 67108864 bytes"), (0xff, "UTF-8")] {
             let error = read_text(io::repeat(endless)).unwrap_err().to_string();
             assert!(error.contains(reason), "{error}");
         }
