@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz sanitizers \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms calibration faults fuzz sanitizers \
 	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
@@ -76,6 +76,12 @@ false-alarms: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms --bin misses
 	$(BUILD)/false_alarms --out target/false_alarms $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 	$(BUILD)/misses --out target/misses $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+
+# Likelihood ratios of damaged copies, of other recipients and of wrong keys; about half an hour for
+# the three maps of docs/evaluation.md.
+calibration: build
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin calibration
+	$(BUILD)/calibration --out target/calibration $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # Kills and full disks while marked maps are written, more of them than in the tests.
 faults: build

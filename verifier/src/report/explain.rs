@@ -1,6 +1,8 @@
 //! The output of `--explain`: the report in sentences, for readers who depend on it.
 
-use super::{DepositEntry, FingerprintEntry, MarkParameters, PatchAgreement, Report, Standing};
+use super::{
+    DepositEntry, FingerprintEntry, LikelihoodEntry, MarkParameters, PatchAgreement, Report, Standing,
+};
 use crate::{
     inputs::digests::Inputs,
     words::{clipped, power_of_ten},
@@ -14,12 +16,13 @@ pub fn explain(inputs: &Inputs, report: &Report) -> String {
     let sections = [
         ("What was compared", compared(inputs, report)),
         ("What was found", found(report)),
+        ("What that says about whose copy it is", likelihood(report)),
         (what_is_bound(report), bound(report)),
         ("What was not tested", not_tested(report)),
         ("What makes this evidence", deposit(inputs, report)),
     ];
     let mut text = String::new();
-    for (title, sentences) in sections {
+    for (title, sentences) in sections.into_iter().filter(|(_, sentences)| !sentences.is_empty()) {
         let _ = writeln!(text, "{title}");
         sentences.iter().for_each(|sentence| {
             let _ = writeln!(text, "  {sentence}");
@@ -134,6 +137,11 @@ pub(crate) fn not_tested(report: &Report) -> Vec<String> {
     ]
     .map(String::from)
     .to_vec()
+}
+
+/// Returns sentences about the likelihood ratios; none where there are none.
+pub(crate) fn likelihood(report: &Report) -> Vec<String> {
+    report.likelihood.iter().flat_map(LikelihoodEntry::to_sentences).collect()
 }
 
 fn found(report: &Report) -> Vec<String> {

@@ -9,6 +9,7 @@ mod evidence_map;
 pub(crate) mod explain;
 mod extent;
 mod fingerprint;
+mod likelihood;
 pub mod sketch;
 mod text;
 
@@ -20,6 +21,7 @@ pub use evidence_map::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidenc
 pub use explain::explain;
 pub use extent::Extent;
 pub use fingerprint::{FingerprintEntry, PatchAgreement, SignAgreement};
+pub use likelihood::LikelihoodEntry;
 
 use crate::{ExitCode, words::printable};
 use meshmark_core::{
@@ -76,6 +78,9 @@ pub struct Report {
     pub null_hypothesis: Option<Null>,
     /// log₁₀ of the p-value of this much evidence for any message under a random key.
     pub p_any_message_log10: Option<f64>,
+    /// The likelihood ratios of the recipient; null where the mark is a message, and where nothing was
+    /// observed or no recipient is named.
+    pub likelihood: Option<LikelihoodEntry>,
     /// The records that were tried; null when the request names one mark.
     pub candidates: Option<Candidates>,
     /// The case, from a case file; null without one.

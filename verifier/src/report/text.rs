@@ -1,6 +1,6 @@
 //! The report as a short text.
 
-use super::{Certainty, Faults, Report};
+use super::{Certainty, Faults, LikelihoodEntry, Report};
 use crate::words::power_of_ten;
 use meshmark_core::{code::Decoder, counted};
 use meshmark_detection::{
@@ -34,6 +34,7 @@ impl Report {
         }
         lines.extend(self.fingerprint.iter().flat_map(|fingerprint| fingerprint.to_lines()));
         lines.extend(self.p_value_lines());
+        lines.extend(self.likelihood.iter().flat_map(LikelihoodEntry::to_lines));
         let v = &self.vertices;
         lines.push(format!(
             "vertices:     {} of {} reference vertices found within {} m{} among {} of the suspect{}",
