@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms calibration faults fuzz sanitizers \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms calibration validation faults fuzz sanitizers \
 	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
@@ -83,6 +83,13 @@ calibration: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin calibration
 	$(BUILD)/calibration --out target/calibration $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
+# docs/validation.md from all studies of errors; some hours for the nine maps, see the sizes in
+# studies/validation.sh.
+validation: build
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms --bin misses \
+		--bin calibration --bin coalitions
+	studies/validation.sh $(BUILD) target/validation $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+
 # Kills and full disks while marked maps are written, more of them than in the tests.
 faults: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-host-tests --bin faults
@@ -138,6 +145,7 @@ $(WHEEL_PYTHON):
 	python3 -m venv target/wheel/python
 	$@ -m pip install --quiet pyogrio==0.13.0 geopandas==1.1.1
 
+deb: export MESHMARK_COMMIT = $(shell git rev-parse HEAD 2>/dev/null)
 deb: build
 	./install-deps.sh dpkg-dev
 	packaging/deb.sh $(BUILD) target/deb

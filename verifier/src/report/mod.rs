@@ -4,6 +4,7 @@
 mod candidates;
 mod case;
 mod deposit;
+pub(crate) mod error_rates;
 mod evidence;
 mod evidence_map;
 pub(crate) mod explain;
@@ -215,11 +216,18 @@ impl Report {
         serde_json::to_string_pretty(self).expect("numbers and strings are JSON") + "\n"
     }
 
-    /// Returns the report as a file holds it, which is the same for the same input and which others
-    /// read.
+    /// Returns the report as a file holds it, which is the same for the same input.
     pub fn into_file(self) -> Self {
-        let candidates = self.candidates.map(Candidates::into_file);
-        Report { seconds: None, candidates, ..self }
+        Report { seconds: None, ..self }
+    }
+
+    /// Hides the names of recipients whose records were tried and do not match.
+    pub fn hide_others(&mut self) {
+        let Some(candidates) = &mut self.candidates else { return };
+        candidates.hide_others();
+        if candidates.matches == 0 {
+            self.parameters.recipient = None;
+        }
     }
 
     /// Returns the exit code of this verdict.

@@ -157,7 +157,7 @@ impl Report {
 
     /// Returns whether a copy was sought, and not a key alone.
     pub(crate) fn is_of_somebody(&self) -> bool {
-        self.null_hypothesis.is_some() || self.parameters.recipient.is_some()
+        self.null_hypothesis.is_some() || self.parameters.recipient.is_some() || self.candidates.is_some()
     }
 
     pub(crate) fn verdict_name(&self) -> &'static str {
