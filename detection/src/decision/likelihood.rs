@@ -26,7 +26,8 @@ use super::{
 use serde::Serialize;
 use std::f64::consts::{LN_10, PI};
 
-/// log₁₀ of the largest ratio that is stated: the study tests more than so many of the innocent.
+/// log₁₀ of the largest ratio that is stated: the study tests about so many of the innocent, none of
+/// whom comes near it.
 pub const MOST_LOG10: f64 = 6.0;
 /// log₁₀ of the smallest ratio that is stated: the study has no more than some hundred copies.
 pub const LEAST_LOG10: f64 = -2.0;

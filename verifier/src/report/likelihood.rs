@@ -6,7 +6,7 @@ use serde::Serialize;
 /// Rungs of the verbal scale: log₁₀ of the ratio below which each expression holds.
 ///
 /// European Network of Forensic Science Institutes, *ENFSI guideline for evaluative reporting in
-/// forensic science*, approved version 3.0, 2015, section 4.
+/// forensic science*, approved version 3.0, 2015.
 const SCALE: [(f64, &str); 7] = [
     (0.301, "no"),
     (1.0, "weak"),
