@@ -20,8 +20,8 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz fuzz-build sanitizers wheel \
-	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms calibration validation faults \
+	fuzz fuzz-build sanitizers quality conformance hosts newcomer qgis plugin-for-wheel wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -76,6 +76,19 @@ false-alarms: build
 	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms --bin misses
 	$(BUILD)/false_alarms --out target/false_alarms $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 	$(BUILD)/misses --out target/misses $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+
+# Likelihood ratios of damaged copies, of other recipients and of wrong keys; about half an hour for
+# the three maps of docs/evaluation.md.
+calibration: build
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin calibration
+	$(BUILD)/calibration --out target/calibration $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
+
+# docs/validation.md from all studies of errors; some hours for the nine maps, see the sizes in
+# studies/validation.sh.
+validation: build
+	$(WITH_GDAL) $(CARGO) build --release --locked -p meshmark-studies --bin false_alarms --bin misses \
+		--bin calibration --bin coalitions
+	studies/validation.sh $(BUILD) target/validation $(or $(MAPS),$(STUDY_MAPS),$(FIXTURES))
 
 # Kills and full disks while marked maps are written, more of them than in the tests.
 faults: build
@@ -140,6 +153,7 @@ wheel: build
 	./install-deps.sh python3-venv
 	python/make_wheel.sh "$(or $(PYTHON),python3)" target/python
 
+deb: export MESHMARK_COMMIT = $(shell git rev-parse HEAD 2>/dev/null)
 deb: build
 	./install-deps.sh dpkg-dev
 	packaging/deb.sh $(BUILD) target/deb

@@ -30,9 +30,9 @@ pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     source.take(LONGEST_TEXT + 1).read_to_string(&mut text)?;
     match text.len() as u64 {
         0..=LONGEST_TEXT => Ok(text),
-        _ => {
-            Err(io::Error::other(format!("it is longer than the {LONGEST_TEXT} bytes of any key, record or plan")))
-        }
+        _ => Err(io::Error::other(format!(
+            "it is longer than the {LONGEST_TEXT} bytes of any key, record or plan"
+        ))),
     }
 }
 

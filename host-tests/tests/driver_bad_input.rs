@@ -67,7 +67,9 @@ fn a_malformed_key_file_is_named_and_never_quoted() {
         &host,
         &map(),
         &options,
-        &["key file /dev/zero cannot be read (it is longer than the 67108864 bytes of any key, record or plan)"],
+        &[
+            "key file /dev/zero cannot be read (it is longer than the 67108864 bytes of any key, record or plan)",
+        ],
     );
 }
 

@@ -89,7 +89,12 @@ pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<V
         let file = path("suspect.gpkg");
         let attacked = attack(row).apply(if is_marked { &marked } else { &original }, seed)?;
         attacked.write(&file)?;
-        let found = examine(&right, &reference, &file)?;
+        let parameters = Parameters { precision_crs_units: Some(PRECISION_M), ..Parameters::default() };
+        let sought = Sought::Message { bits: 128 };
+        let Found::Message(found) = examine(&right, [&reference, &file], sought, parameters)?? else {
+            unreachable!("a message is sought")
+        };
+        let found = found.demodulation;
         std::fs::remove_file(&file)?;
         let innocent = |i: usize| wrong_recipient(&found, &right, number * count + i);
         Ok(Sample {
@@ -109,17 +114,23 @@ fn attack(row: Option<&str>) -> Attack {
     found.map_or(Attack::Sequence(Vec::new()), |row| row.attack)
 }
 
-fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodulation> {
+/// Examines a suspect as `meshmark verify` does. Returns the reason where there is no evidence.
+pub(crate) fn examine(
+    key: &SecretKey,
+    [reference, suspect]: [&Path; 2],
+    sought: Sought,
+    parameters: Parameters,
+) -> Result<std::result::Result<Found, String>> {
     let request = Request {
         key: key.clone(),
         reference: reference.into(),
         suspect: PrivateCopy::make("suspect", suspect)?,
         record: None,
         subject: None,
-        sought: Sought::Message { bits: 128 },
+        sought,
         lineage: Default::default(),
         tried: 1,
-        parameters: Parameters { precision_crs_units: Some(PRECISION_M), ..Parameters::default() },
+        parameters,
         layers: None,
         srs: None,
         landmarks: Vec::new(),
@@ -133,10 +144,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     };
     let mut progress = Progress::default();
     let map = verify::read_reference(&request, &mut progress)?.or_fail()?;
-    match verify::examine(&request, (&map, &Default::default()), &mut progress)?.or_fail()?.found? {
-        Found::Message(evidence) => Ok(evidence.demodulation),
-        Found::Fingerprint(_) => unreachable!("a message is sought"),
-    }
+    Ok(verify::examine(&request, (&map, &Default::default()), &mut progress)?.or_fail()?.found)
 }
 
 fn decide(found: &Demodulation, carried: Message) -> Decision {

@@ -86,7 +86,7 @@ pub fn study(product: &Product, map: &Path, count: usize, seed: u64) -> Result<V
 }
 
 /// Draws the damage of a copy: one way, or two in sequence.
-fn draw(random: &mut Random) -> (String, Attack) {
+pub(crate) fn draw(random: &mut Random) -> (String, Attack) {
     let mut one = || {
         let (name, least, most, attack) = WAYS[random.below(WAYS.len())];
         let strength = if least > 0.0 { least * (most / least).powf(random.unit()) } else { most };

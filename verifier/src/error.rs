@@ -38,6 +38,10 @@ pub enum Error {
     WrongPassphrase { path: PathBuf },
     #[error("the passphrase is empty: give one, on the first line of the file if it is in one")]
     NoPassphrase,
+    #[error(
+        "the passphrase has more than {most} bytes: give the first line of the right file, or a shorter one"
+    )]
+    LongPassphrase { most: u64 },
     #[error("the passphrase was not the same again: start anew")]
     OtherPassphrase,
     #[error(
@@ -64,6 +68,8 @@ pub enum Error {
         path.display()
     )]
     NoFileToDeposit { path: PathBuf },
+    #[error("the input {} cannot be in a bundle, as {reason}", path.display())]
+    NotBundled { path: PathBuf, reason: String },
     #[error("the folder {} cannot be read: {source}", path.display())]
     FolderUnread { path: PathBuf, source: io::Error },
     #[error("{flag} contradicts the record: leave one of them out")]
@@ -187,6 +193,8 @@ pub enum Error {
          files that were deposited, unchanged"
     )]
     NotDeposited { what: String },
+    #[error("the bundle {} is not made again from what is here: {differences}", path.display())]
+    NotRepeated { path: PathBuf, differences: String },
     #[error("the time stamp {} {source}", path.display())]
     TimeStamp { path: PathBuf, source: StampFault },
     #[error("{} holds no certificate: give a bundle of the authorities that you trust, PEM", path.display())]
@@ -223,6 +231,12 @@ pub enum Error {
     Uncopied { what: &'static str, path: PathBuf, place: PathBuf, source: io::Error },
     #[error("the suspect {} was changed while it was examined: verify it again when nobody writes to it", path.display())]
     SuspectChanged { path: PathBuf },
+    #[error(
+        "an input was changed while the suspect was examined ({what}): verify again when nobody writes to any of them"
+    )]
+    InputChanged { what: String },
+    #[error("{} is no bundle of a case ({reason}): give the file that `meshmark verify --bundle` wrote", path.display())]
+    NoBundle { path: PathBuf, reason: String },
     #[error("GDAL takes no option: {source}")]
     NoOption { source: GdalError },
     #[error("the suspect {} is made of other tables: copy it to a plain file, for example with ogr2ogr", path.display())]
@@ -356,6 +370,7 @@ impl Error {
             }
             Dataset(error) if error.is_of_other_base() => ExitCode::DoesNotBelong,
             NotDeposited { .. }
+            | NotRepeated { .. }
             | OtherKey { .. }
             | OtherCommitment { .. }
             | OtherParts { .. }
@@ -366,7 +381,11 @@ impl Error {
             | SheetsDisagree { .. }
             | OtherReference { .. }
             | NoReferenceOfRecord { .. } => ExitCode::DoesNotBelong,
-            Unopened { .. }
+            TextUnread { .. }
+            | FolderUnread { .. }
+            | NoBundle { .. }
+            | InputChanged { .. }
+            | Unopened { .. }
             | Unconverted { .. }
             | Unmeasured { .. }
             | Undigested { .. }

@@ -11,7 +11,8 @@ pub enum ExitCode {
     Usage = 2,
     /// The suspect does not allow an answer.
     Inconclusive = 3,
-    /// The record or the deposit does not belong to this reference or this key.
+    /// The record or the deposit does not belong to this reference or this key, or a bundle is not made
+    /// again.
     DoesNotBelong = 4,
     /// An input cannot be read.
     Unreadable = 5,

@@ -7,6 +7,7 @@
 //! suspect.
 #![forbid(unsafe_code)]
 
+pub mod bundle;
 pub mod compare;
 pub mod confinement;
 pub mod copies_index;

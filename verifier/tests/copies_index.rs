@@ -77,7 +77,7 @@ fn every_record_is_a_row_that_says_whether_the_copy_is_the_recorded_one() {
 #[test]
 fn a_folder_that_is_missing_or_has_no_record_or_a_damaged_one_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    assert_eq!(records(&folder.path().join("none")).0, Some(2));
+    assert_eq!(records(&folder.path().join("none")).0, Some(5));
     let (code, text) = records(folder.path());
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("has no record"), "{text}");

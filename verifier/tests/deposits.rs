@@ -237,7 +237,7 @@ fn what_is_no_deposit_is_refused_by_its_fault() {
         assert!(code == Some(2) && text.contains(words), "{code:?} {text}");
     }
     fs::remove_file(vendor.path("series.deposit")).unwrap();
-    assert_eq!(vendor.verify().0, Some(2));
+    assert_eq!(vendor.verify().0, Some(5));
     fs::write(vendor.path("series.deposit"), &text).unwrap();
     fs::write(vendor.path("key.public.pem"), "none").unwrap();
     assert!(vendor.verify().1.contains("is no public key"));

@@ -2,6 +2,7 @@
 
 use super::{
     absence::{LEAST_FULLNESS, LEAST_MISSED_LOG10, MOST_MISSED_LOG10, SUSPICIOUS_LOG10, TRIAL_DEVIATION},
+    likelihood::{Laws, Ratios},
     recipients::{Standing, needed_score, p_log10},
     survival,
     verdict::Verdict,
@@ -26,6 +27,8 @@ pub struct Grounds {
     /// log₁₀ of the probability that the copy of one recipient has a score below the one needed, or
     /// the least that is stated.
     missed_log10: f64,
+    /// The laws of the scores with a copy and without.
+    laws: Laws,
 }
 
 /// The answer about a recipient, and its grounds.
@@ -38,14 +41,16 @@ pub struct Answer {
     /// log₁₀ of the probability that the test misses a mark which the suspect carries; `None` for a
     /// match.
     pub p_missed_log10: Option<f64>,
+    /// The likelihood ratios.
+    pub likelihood: Ratios,
 }
 
 impl Grounds {
-    /// Collects what a present mark would show. The amplitude of the key's pilots is 1 for a mark of
-    /// full amplitude, and as uncertain as their score allows; `tried` recipients share the
-    /// `significance`.
+    /// Collects what a present mark would show in the evidence about recipients and about pilots. The
+    /// amplitude of the key's pilots is 1 for a mark of full amplitude, and as uncertain as their score
+    /// allows; `tried` recipients share the `significance`.
     pub fn new(
-        evidence: &Evidence,
+        [evidence, of_pilots]: [&Evidence; 2],
         (pilot_amplitude, pilot_score): (f64, f64),
         power: Power,
         (tried, significance): (usize, f64),
@@ -63,7 +68,23 @@ impl Grounds {
             false => LEAST_MISSED_LOG10,
         };
         let may_have_key = p_log10(pilot_score) < SUSPICIOUS_LOG10;
-        Grounds { significance, is_mixed, may_have_key, missed_log10 }
+        let in_full = [evidence, of_pilots].map(|evidence| evidence.expected_score(1.0));
+        let laws = match power {
+            Power::Unmoved => Laws::of_unmoved(),
+            Power::KeyShows => Laws::new(in_full, pilot_score, is_mixed),
+            // The trial mark has the losses of this suspect, which reach the pilots as well.
+            Power::Trial(score) if in_full[0] > 0.0 => {
+                let share = score.max(0.0) / in_full[0];
+                Laws::new(in_full.map(|expected| share * expected), pilot_score, is_mixed)
+            }
+            Power::Trial(_) => Laws::new([0.0; 2], pilot_score, is_mixed),
+        };
+        Grounds { significance, is_mixed, may_have_key, missed_log10, laws }
+    }
+
+    /// Returns the laws of the scores with a copy and without.
+    pub fn laws(&self) -> &Laws {
+        &self.laws
     }
 
     /// Returns whether copies of several recipients may be mixed, so that a look for the shares of
@@ -74,6 +95,7 @@ impl Grounds {
 
     /// Decides on a recipient.
     pub fn decide(&self, standing: &Standing) -> Answer {
+        let likelihood = self.laws.ratios(standing);
         if standing.is_named {
             let what = match standing.is_of_share {
                 true => "agree so well with a share of the coordinates",
@@ -83,13 +105,13 @@ impl Grounds {
                 "the probability that the secret signs of a recipient {what} by chance is below the significance of {:e}",
                 self.significance
             );
-            return Answer { verdict: Verdict::Match, reason, p_missed_log10: None };
+            return Answer { verdict: Verdict::Match, reason, p_missed_log10: None, likelihood };
         }
         let (verdict, reason) = match self.doubt(standing) {
             Some(doubt) => (Verdict::Inconclusive, doubt),
             None => (Verdict::NoMatch, format!("{COPY} would have shown, and it does not")),
         };
-        Answer { verdict, reason, p_missed_log10: Some(self.missed_log10) }
+        Answer { verdict, reason, p_missed_log10: Some(self.missed_log10), likelihood }
     }
 
     /// Returns why the verdict cannot be "no match", and what would help; `None` where it can.
@@ -166,7 +188,7 @@ mod tests {
         let seen = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
         let candidates: Vec<Sequence> = tried.iter().map(|name| signs(name)).collect();
         let standings = name_recipients(&evidence, &candidates, SIGNIFICANCE);
-        let grounds = Grounds::new(&evidence, seen, power, (tried.len(), SIGNIFICANCE));
+        let grounds = Grounds::new([&evidence, &of_pilots], seen, power, (tried.len(), SIGNIFICANCE));
         grounds.decide(standings.last().unwrap())
     }
 
@@ -210,9 +232,10 @@ mod tests {
 
     #[test]
     fn weak_evidence_is_never_no_match() {
-        let evidence = Evidence::of_recipients(&mean_of(&["A"], 0.95, 4));
+        let estimates = mean_of(&["A"], 0.95, 4);
+        let [evidence, of_pilots] = [Evidence::of_recipients, Evidence::of_pilots].map(|of| of(&estimates));
         let grounds = |tried, significance| {
-            Grounds::new(&evidence, (1.0, 20.0), Power::Trial(50.0), (tried, significance))
+            Grounds::new([&evidence, &of_pilots], (1.0, 20.0), Power::Trial(50.0), (tried, significance))
         };
         let standing = |score: f64, p_value_log10: f64| {
             let agreement = evidence.agreement(&signs("B"));

@@ -17,6 +17,7 @@ mod absence;
 mod any_message;
 mod decoys;
 pub mod fingerprints;
+pub mod likelihood;
 pub mod recipients;
 mod rivals;
 mod survival;

@@ -171,6 +171,6 @@ fn p_value_log10(score: f64, round: usize, tried: usize) -> f64 {
 }
 
 /// Returns log₁₀ of the factor of a round. A single candidate has no second round.
-fn rounds_log10(round: usize, tried: usize) -> f64 {
+pub(super) fn rounds_log10(round: usize, tried: usize) -> f64 {
     if tried == 1 { 0.0 } else { ((round * (round + 1)) as f64).log10() }
 }

@@ -24,8 +24,12 @@ pub fn normal_log10(score: f64) -> f64 {
 /// smallest factor for which that is true (V. Bentkus, D. Dzindzalieta, *A tight Gaussian bound for
 /// weighted sums of Rademacher random variables*, Bernoulli 21, 2015).
 pub fn signs_log10(score: f64) -> f64 {
-    let factor_log10 = -4f64.log10() - normal_log10(SQRT_2);
-    (factor_log10 + normal_log10(score)).min(0.0)
+    (signs_factor_log10() + normal_log10(score)).min(0.0)
+}
+
+/// Returns log₁₀ of the factor of [`signs_log10`], 3.18.
+pub fn signs_factor_log10() -> f64 {
+    -4f64.log10() - normal_log10(SQRT_2)
 }
 
 /// Returns the score from which [`signs_log10`] is at most log₁₀ of `p`, for p from 10⁻³⁰⁰ to 1.

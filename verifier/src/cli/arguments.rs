@@ -51,6 +51,13 @@ pub(super) enum Subcommands {
         #[command(flatten)]
         args: Box<VerifyArgs>,
     },
+    /// Make the bundle of a case again, from the same inputs, and compare the two byte by byte
+    ///
+    /// Run it in a folder that has the inputs in the same places as the folder where the bundle was made;
+    /// what the bundle holds itself is there after unzipping it. Exit codes: 0 the same, 2 usage, 4 an
+    /// input or the result differs, and the message names it, 5 unreadable input, 7 an output cannot be
+    /// written.
+    Repeat(RepeatArgs),
     /// Measure the effect of marking on a map: displacement, angles, areas, topology
     ///
     /// Features correspond by their order in each layer, vertices by their order in each feature.
@@ -61,7 +68,7 @@ pub(super) enum Subcommands {
     ///
     /// The list is a CSV file with a column headed "recipient", or of one column. A copy appears
     /// when it is complete, was read back and carries its mark; the same command again skips
-    /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable map, 6 too
+    /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable input, 6 too
     /// large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
     /// Plan the sheets of a map, so that they are marked apart and fit together
@@ -75,8 +82,8 @@ pub(super) enum Subcommands {
     ///
     /// The table is CSV: recipient, edition (SHA-256 of the vertices of the unmarked map), number of
     /// earlier editions, record, copy beside the record, its SHA-256, whether it is the recorded one,
-    /// and the day on which it was last written. Exit codes: 0 listed, 2 usage, or no readable records,
-    /// 5 unreadable copy.
+    /// and the day on which it was last written. Exit codes: 0 listed, 2 usage, or no records,
+    /// 5 unreadable input.
     Records {
         /// Folder of the records (*.json), such as the output of `meshmark distribute`
         folder: PathBuf,
@@ -217,6 +224,14 @@ pub(super) struct PlanArgs {
 }
 
 #[derive(Args)]
+pub(super) struct RepeatArgs {
+    /// The bundle that `meshmark verify --bundle` wrote
+    pub(super) bundle: PathBuf,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
+}
+
+#[derive(Args)]
 pub(super) struct CompareArgs {
     /// The map as it was before marking
     pub(super) reference: PathBuf,
@@ -283,7 +298,8 @@ impl From<DemodulatorArg> for Demodulator {
 }
 
 #[derive(Args)]
-#[command(group = ArgGroup::new("files").multiple(true).args(["report", "evidence_map"]))]
+#[command(group = ArgGroup::new("files").multiple(true).args(["report", "bundle", "evidence_map"]))]
+#[command(group = ArgGroup::new("reports").multiple(true).args(["report", "bundle"]))]
 pub(super) struct VerifyArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
@@ -335,8 +351,16 @@ pub(super) struct VerifyArgs {
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Bundle of the case to write (.zip): the report in both forms, the deposit with what vouches for it,
+    /// and the digests of all inputs, which must lie in the current folder; `meshmark repeat` makes it
+    /// again
+    #[arg(long, value_name = "FILE")]
+    pub(super) bundle: Option<PathBuf>,
+    /// Name recipients, too, whose records were tried and do not match
+    #[arg(long, requires = "records")]
+    pub(super) show_recipients: bool,
     /// Case file for the report, TOML: number, examiner, date, custody (a list)
-    #[arg(long, value_name = "FILE", requires = "report")]
+    #[arg(long, value_name = "FILE", requires = "reports")]
     pub(super) case: Option<PathBuf>,
     /// Include exact displacements of vertices in the report and the evidence map, which then must be
     /// kept as secret as the records

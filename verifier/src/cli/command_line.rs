@@ -18,27 +18,49 @@ pub fn own() -> String {
 /// Returns a command line without options that only name outputs, and with the report as
 /// `report.html`. That of a child is the one of its parent.
 fn shown(arguments: impl Iterator<Item = String>) -> String {
-    let mut words = vec!["meshmark".to_string()];
     let mut arguments = arguments.skip(1).peekable();
+    let mut words = vec!["meshmark".to_string()];
     if arguments.next_if(|first| first == EXAMINE).is_some() {
         arguments.next();
         words.push("verify".into());
+    } else {
+        words.extend(arguments.next());
     }
-    let mut files = Vec::new(); // after "--" no word is an option
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--" => {
-                files = std::iter::once("--".into()).chain(arguments.by_ref()).map(|w| quoted(&w)).collect()
-            }
-            "--report" | "--evidence-map" => drop(arguments.next()),
+    let (options, files) = split(repeatable(arguments));
+    words.extend(options.iter().map(|word| quoted(word)));
+    words.extend(["--report".into(), "report.html".into()]);
+    words.extend(files.iter().map(|word| quoted(word)));
+    words.join(" ")
+}
+
+/// Returns the arguments of this `verify` that another machine can repeat.
+pub fn own_repeatable() -> Vec<String> {
+    repeatable(std::env::args_os().skip(2).map(|word| word.to_string_lossy().into_owned()))
+}
+
+/// Returns arguments without those that only name outputs, or where a passphrase is.
+pub fn repeatable(arguments: impl Iterator<Item = String>) -> Vec<String> {
+    const WITH_VALUE: [&str; 4] = ["--report", "--evidence-map", "--bundle", "--passphrase-file"];
+    let (options, files) = split(arguments.collect());
+    let (mut kept, mut options) = (Vec::new(), options.into_iter());
+    while let Some(word) = options.next() {
+        let is_output = |name: &&str| word.strip_prefix(*name).is_some_and(|rest| rest.starts_with('='));
+        match word.as_str() {
+            name if WITH_VALUE.contains(&name) => drop(options.next()),
             "--json" | "--explain" => {}
-            word if word.starts_with("--report=") || word.starts_with("--evidence-map=") => {}
-            word => words.push(quoted(word)),
+            _ if WITH_VALUE.iter().any(|name| is_output(&name)) => {}
+            _ => kept.push(word),
         }
     }
-    words.extend(["--report".into(), "report.html".into()]);
-    words.extend(files);
-    words.join(" ")
+    kept.extend(files);
+    kept
+}
+
+/// Divides arguments into those before "--" and the rest, of which no word is an option.
+fn split(mut arguments: Vec<String>) -> (Vec<String>, Vec<String>) {
+    let end = arguments.iter().position(|word| word == "--").unwrap_or(arguments.len());
+    let files = arguments.split_off(end);
+    (arguments, files)
 }
 
 #[cfg(test)]

@@ -52,7 +52,10 @@ fn make(args: &DepositArgs) -> Result<()> {
 
 /// Returns how to send the request for a time stamp, which this program does not.
 fn sending(request: &Path) -> String {
-    let response = request.with_extension("tsr");
+    let mut response = request.with_extension("tsr");
+    if response == request {
+        response.as_mut_os_string().push(".tsr"); // curl would write over the request
+    }
     let [shown, request, response] = [request, request, &response].map(|path| path.display().to_string());
     format!(
         "request for a time stamp written to {shown}; an authority answers it:\n\

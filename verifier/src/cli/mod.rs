@@ -5,6 +5,7 @@ mod command_line;
 mod deposit;
 mod keygen;
 mod printing;
+mod repeat;
 mod request;
 mod verification;
 
@@ -35,6 +36,7 @@ pub fn run() -> u8 {
         Subcommands::Deposit(args) => deposit::run(&args).map(|()| DONE),
         Subcommands::Verify(args) => verification::run(&args),
         Subcommands::Examine { folder, args } => verification::examine(*args, &folder).map(|code| code as u8),
+        Subcommands::Repeat(args) => repeat::run(&args).map(|()| DONE),
         Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
         Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
         Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),

@@ -52,7 +52,7 @@ pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<R
             demodulator: args.demodulator.into(),
             radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
             significance: args.significance,
-            sketch: args.report.is_some(),
+            sketch: args.report.is_some() || args.bundle.is_some(),
             evidence_map: args.evidence_map.is_some(),
             exact_displacements: args.exact_displacements,
         })

@@ -1,18 +1,22 @@
 //! `verify`: the parent, which publishes the results, and its child, which examines the suspect.
 
 use super::{
-    arguments::VerifyArgs,
+    arguments::{TrustFlags, VerifyArgs},
     command_line, deposit,
     printing::{WARNING, print, warn, warn_of_displacements},
     request::requests,
 };
+use meshmark_detection::decision::Verdict;
 use meshmark_verifier::{
     Error, ExitCode, Result,
+    bundle::{Bundle, Manifest, Role, Used},
     confinement::{self, End, Handover, Limits},
     deposit::Expected,
     html,
-    inputs::{case_file, digests::Digests, gdal_failures, private_copy::PrivateCopy, versions::versions},
-    outputs::{EvidenceMapFile, Format, ReportFile, write_evidence_map},
+    inputs::{
+        case_file, digests::Digests, gdal_failures, private_copy::PrivateCopy, versions::versions_and_program,
+    },
+    outputs::{EvidenceMapFile, Format, NewFile, ReportFile, write_evidence_map},
     progress::{Bar, Progress},
     report::{self, Provenance, Report},
     verify, verify_records,
@@ -26,6 +30,8 @@ const BY_SIGNAL: i32 = 128;
 /// Has a child examine the suspect, publishes the results and returns the exit code.
 pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
+    let bundle = args.bundle.as_deref().map(|path| NewFile::new("bundle", path)).transpose()?;
+    let manifest = bundle.as_ref().map(|_| manifest(args)).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     warn_of_displacements(args.exact_displacements);
     let passphrase = args.opening.passphrase().for_child(&args.key)?;
@@ -53,10 +59,40 @@ pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
         target.publish(&handover.evidence_map())?;
     }
     print(&answer)?;
-    if let Some((file, text)) = file.zip(passed(&handover.report())?) {
+    let report = |format: Format| passed(&handover.report(format.ending()));
+    if let Some(file) = file
+        && let Some(text) = report(file.format())?
+    {
         file.write(&text)?;
     }
+    if let Some((bundle, before)) = bundle.zip(manifest)
+        && let (Some(page), Some(json)) = (report(Format::Html)?, report(Format::Json)?)
+    {
+        let changed = before.other_inputs();
+        if !changed.is_empty() {
+            return Err(Error::InputChanged { what: changed.join("; ") });
+        }
+        bundle.write(&Bundle::new(before, page, json)?.to_bytes()?)?;
+    }
     Ok(code)
+}
+
+/// Describes the inputs of this command.
+fn manifest(args: &VerifyArgs) -> Result<Manifest> {
+    let TrustFlags { public_key, time_stamp, authorities } = &args.trust;
+    let optional = [
+        (Role::Record, &args.record),
+        (Role::Records, &args.records),
+        (Role::Case, &args.case),
+        (Role::Deposit, &args.deposit),
+        (Role::PublicKey, public_key),
+        (Role::TimeStamp, time_stamp),
+        (Role::Authorities, authorities),
+    ];
+    let mut used: Vec<Used> = vec![(Role::Suspect, &args.suspect), (Role::Key, &args.key)];
+    used.extend(args.reference.iter().map(|path| (Role::Reference, path.as_path())));
+    used.extend(optional.into_iter().filter_map(|(role, path)| Some((role, path.as_deref()?))));
+    Manifest::new(command_line::own_repeatable(), &used)
 }
 
 fn limits(args: &VerifyArgs) -> Limits {
@@ -82,13 +118,13 @@ pub(super) fn examine(args: VerifyArgs, folder: &Path) -> Result<ExitCode> {
     if gdal_failures::ran_out_of_memory() {
         return Err(Error::MemoryLimit { path, megabytes: limits.memory_mb });
     }
-    let Examined { answer, report, code } = examined?;
+    let Examined { answer, reports, code } = examined?;
     let handover = Handover(folder);
     let write = |path: &Path, text: &str| {
         fs::write(path, text).map_err(|error| Error::unwritten(path.display(), error))
     };
-    if let Some(report) = report {
-        write(&handover.report(), &report)?;
+    for (format, text) in reports {
+        write(&handover.report(format.ending()), &text)?;
     }
     write(&handover.answer(), &answer)?; // it states that all is written
     Ok(code)
@@ -97,19 +133,24 @@ pub(super) fn examine(args: VerifyArgs, folder: &Path) -> Result<ExitCode> {
 /// The results of an examination.
 struct Examined {
     answer: String,
-    report: Option<String>,
+    reports: Vec<(Format, String)>,
     code: ExitCode,
 }
 
 fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     let format = args.report.as_deref().map(ReportFile::format_of).transpose()?;
+    let formats = match args.bundle {
+        Some(_) => vec![Format::Html, Format::Json],
+        None => Vec::from_iter(format),
+    };
     let references = args.reference.clone();
     let suspect = PrivateCopy::made_in(folder, &args.suspect)?;
     let case = args.case.as_deref().map(case_file::read).transpose()?;
-    let wanted = args.explain || format.is_some();
+    let wanted = args.explain || !formats.is_empty();
     let digest = || Digests::read(&args.key, &references, &suspect, args.record.as_deref());
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
+    let show_recipients = args.show_recipients;
     let requests = requests(&args, &suspect)?;
     let files = args.deposit.as_deref().map(|path| deposit::files(path, &args.trust, None));
     let expected = files.map(|files| Expected::read(&files, &references)).transpose()?;
@@ -121,31 +162,36 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     if let Some(expected) = expected {
         report.deposit = Some(expected.compare(&requests[0], args.record.as_deref(), &report)?);
     }
+    let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.best()?.record));
+    let best = best().filter(|_| show_recipients || report.verdict == Verdict::Match);
+    if !show_recipients {
+        report.hide_others();
+    }
     if let Some(map) = report.evidence_map.take() {
         write_evidence_map(&map, &Handover(folder).evidence_map())?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
     let code = report.exit_code();
     let mut answer = if json { report.to_json() } else { report.to_text() };
-    let Some(digests) = digests else { return Ok(Examined { answer, report: None, code }) };
-    let best = || Some(records.as_ref()?.join(&report.candidates.as_ref()?.list.first()?.record));
-    let inputs = digests.of_verification(&report.reference, best().as_deref())?;
+    let Some(digests) = digests else { return Ok(Examined { answer, reports: Vec::new(), code }) };
+    let inputs = digests.of_verification(&report.reference, best.as_deref())?;
     if explain {
         answer += &format!("\n{}", report::explain(&inputs, &report));
     }
-    let report = format.map(|format| {
-        let provenance = Provenance {
-            inputs,
-            reference_vertices_sha256: report.reference_digest.clone(),
-            suspect_crs: report.suspect_crs.clone(),
-            command: command_line::own(),
-            versions: versions(),
-        };
-        let report = Report { provenance: Some(provenance), evidence, case, ..report.into_file() };
-        match format {
-            Format::Html => html::verification(&report),
-            Format::Json => report.to_json(),
-        }
-    });
-    Ok(Examined { answer, report, code })
+    if formats.is_empty() {
+        return Ok(Examined { answer, reports: Vec::new(), code });
+    }
+    let provenance = Provenance {
+        inputs,
+        reference_vertices_sha256: report.reference_digest.clone(),
+        suspect_crs: report.suspect_crs.clone(),
+        command: command_line::own(),
+        versions: versions_and_program()?,
+    };
+    let report = Report { provenance: Some(provenance), evidence, case, ..report.into_file() };
+    let written = |format: Format| match format {
+        Format::Html => (format, html::verification(&report)),
+        Format::Json => (format, report.to_json()),
+    };
+    Ok(Examined { answer, reports: formats.into_iter().map(written).collect(), code })
 }

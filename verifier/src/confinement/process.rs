@@ -49,9 +49,9 @@ impl Handover<'_> {
         self.0.join("answer")
     }
 
-    /// Returns the path of the report file.
-    pub fn report(&self) -> PathBuf {
-        self.0.join("report")
+    /// Returns the path of the report in a form, by the ending of its name.
+    pub fn report(&self, ending: &str) -> PathBuf {
+        self.0.join("report").with_extension(ending)
     }
 
     /// Returns the path of the evidence map.

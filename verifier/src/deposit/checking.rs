@@ -57,13 +57,27 @@ impl<'a> Comparison<'a> {
             return Err(Error::NotDeposited { what: format!("reference {name}") });
         }
         self.standing.fixed.push(format!("vertices of the reference {name}"));
-        let are_held = !files.is_empty() && files.iter().all(|sha256| self.deposit.holds_file(sha256));
+        let are_held = self.deposit.holds_files(vertices_sha256, files);
         let file = format!("file of the reference {name}");
         match are_held {
             true => self.standing.fixed.push(file),
             false => self.standing.not_fixed.push(format!("{file}, whose vertices are those of the deposit")),
         }
         Ok(())
+    }
+
+    /// Compares a reference of which this verification has another edition; the deposit need not hold it.
+    ///
+    /// # Errors
+    /// Fails when the reference cannot be read.
+    pub(super) fn other_reference(&mut self, path: &Path, files: &[String]) -> Result<()> {
+        let vertices_sha256 = vertices_of(self.deposit, path)?;
+        if vertices_sha256.is_empty() {
+            let name = printable(&path.display().to_string());
+            self.standing.not_fixed.push(format!("the other reference {name}"));
+            return Ok(());
+        }
+        self.reference(path, &vertices_sha256, files)
     }
 
     /// Compares a record, by the digest of its file.

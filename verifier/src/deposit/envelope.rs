@@ -3,7 +3,7 @@
 use super::{
     DepositFault,
     signing_key::{PublicKey, SigningKey},
-    statement::Statement,
+    statement::{Predicate, Statement},
 };
 use crate::{Error, Result, inputs::texts};
 use base64::{Engine, engine::general_purpose::STANDARD as BASE64};
@@ -127,9 +127,23 @@ impl Deposit {
     }
 
     /// Returns whether a reference has a file with this digest.
-    pub fn holds_file(&self, sha256: &str) -> bool {
+    fn holds_file(&self, sha256: &str) -> bool {
         let digests = |subject: &super::statement::Subject| subject.digest.get("sha256").cloned();
         self.statement.subject.iter().filter_map(digests).any(|held| held == sha256)
+    }
+
+    /// Returns whether these are the files of a reference with these vertices, and none is missing.
+    pub fn holds_files(&self, vertices_sha256: &str, files: &[String]) -> bool {
+        let Predicate { references, .. } = &self.statement.predicate;
+        let names = references.iter().filter(|one| one.vertices_sha256 == vertices_sha256);
+        let is_alone = references.iter().all(|one| one.reference == references[0].reference);
+        let has_all = |name: &str| {
+            let own = self.statement.subject.iter().filter(|file| is_alone || belongs(&file.name, name));
+            own.filter_map(|file| file.digest.get("sha256")).all(|held| files.contains(held))
+        };
+        !files.is_empty()
+            && files.iter().all(|file| self.holds_file(file))
+            && names.map(|one| &one.reference).any(|n| has_all(n))
     }
 
     /// Returns whether it holds a record whose file has this digest.
@@ -141,4 +155,10 @@ impl Deposit {
     pub fn holds_recipient(&self, key: &SecretKey, recipient: &str) -> bool {
         self.statement.predicate.recipients.holds(&key.blinded(recipient))
     }
+}
+
+/// Returns whether a file is one of those of a reference: has its name, whatever comes after that.
+fn belongs(file: &str, reference: &str) -> bool {
+    let stem = Path::new(reference).file_stem().unwrap_or_default().to_string_lossy();
+    file == reference || file.strip_prefix(stem.as_ref()).is_some_and(|rest| rest.starts_with('.'))
 }

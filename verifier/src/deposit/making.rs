@@ -86,12 +86,21 @@ fn subjects(references: &[PathBuf]) -> Result<Vec<Subject>> {
         if files.is_empty() {
             return Err(Error::NoFileToDeposit { path: path.clone() });
         }
-        subjects.extend(files.into_iter().map(|(name, sha256)| Subject {
-            name,
-            digest: BTreeMap::from([("sha256".to_string(), sha256)]),
-        }));
+        let new = files
+            .into_iter()
+            .map(|(name, sha256)| Subject { name, digest: BTreeMap::from([("sha256".to_string(), sha256)]) });
+        add_new(&mut subjects, new);
     }
     Ok(subjects)
+}
+
+/// Adds what is not there yet: who names a reference twice deposits it once.
+fn add_new<T: PartialEq>(all: &mut Vec<T>, more: impl IntoIterator<Item = T>) {
+    for one in more {
+        if !all.contains(&one) {
+            all.push(one);
+        }
+    }
 }
 
 /// Returns the vertices of every reference: of the layers that its records name, or of all layers
@@ -118,7 +127,7 @@ fn vertices_of_all(references: &[PathBuf], records: &[(PathBuf, ReadRecord)]) ->
         if found.is_empty() {
             found.push(vertices(path, None, None)?);
         }
-        all.extend(found);
+        add_new(&mut all, found);
     }
     Ok(all)
 }

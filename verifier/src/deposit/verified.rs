@@ -40,6 +40,9 @@ impl Expected {
         let own = self.references.iter().find(|(path, _)| *path == report.reference);
         let (path, files) = own.expect("the verification has one of the references");
         comparison.reference(path, &report.reference_digest, files)?;
+        for (path, files) in self.references.iter().filter(|(path, _)| *path != report.reference) {
+            comparison.other_reference(path, files)?;
+        }
         match (record.zip(request.record.as_ref()), &report.candidates) {
             (Some((path, read)), _) => comparison.record(&path.display().to_string(), &read.sha256)?,
             (None, Some(candidates)) => comparison.candidates(candidates)?,

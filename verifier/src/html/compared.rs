@@ -35,6 +35,11 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
     let map = |vertices: usize, crs: &str| html! { (count(vertices)) " vertices, " (crs) };
     let reference_crs = report.parameters.crs.as_deref().unwrap_or("no CRS");
     let notice = explain::same_file(inputs).map(|text| html! { " " b { (text) } });
+    let others = inputs
+        .other_references
+        .iter()
+        .map(|other| file(other, &html! { "given besides, such as an earlier edition" }));
+    let others: Vec<Markup> = others.collect();
     table(&[
         (
             "Suspect",
@@ -43,6 +48,10 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
             ),
         ),
         ("Reference", Some(file(&inputs.reference, &map(v.reference, reference_crs)))),
+        (
+            "Other references",
+            (!others.is_empty()).then(|| html! { @for other in &others { div { (other) } } }),
+        ),
         ("Key", Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } }))),
         ("Record", Some(record(report, inputs.record.as_ref()))),
         ("Recipient", recipient(report)),
@@ -67,10 +76,11 @@ fn record(report: &Report, record: Option<&Digested>) -> Markup {
             (Some(record), Some(_)) if report.verdict == Verdict::Match => {
                 (file(record, &html! { "the best of those that were tried" }))
             },
+            (None, Some(_)) => "those of a folder were tried, none of which matches; the recipients of other copies are not named",
             (Some(record), Some(_)) => {
                 (file(record, &html! { "one of those that were tried, none of which matches; the settings below are its own" }))
             },
-            (None, _) => "none: how the map was marked was taken from the command line",
+            (None, None) => "none: how the map was marked was taken from the command line",
         }
     }
 }
@@ -134,13 +144,14 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                 " Files of the folder that are no such record and were left out: " (count(candidates.skipped)) "."
             }
             @if candidates.tried > candidates.list.len() {
-                @if candidates.matches > 0 { " Those that match are listed." } @else { " The nearest one is listed." }
+                @if candidates.matches > 0 { " Those that match are listed." }
+                @else if !candidates.list.is_empty() { " The nearest ones are listed." }
                 @if let Some(p) = candidates.next_p_value_log10 {
                     " The best of the others fits so well by chance with the probability " (words::probability(p)) "."
                 }
             }
         }
-        table.list {
+        @if !candidates.list.is_empty() { table.list {
             thead { tr { th { "Recipient" } th { "Record" } @if has_bits { th.number { "Bits that differ" } } th.number { "By chance" } th { "" } } }
             tbody {
                 @for (number, entry) in candidates.list.iter().enumerate() {
@@ -156,6 +167,6 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                     }
                 }
             }
-        }
+        } }
     }
 }

@@ -1,7 +1,10 @@
 //! The agreement of the secret signs.
 
-use super::page::{count, section, table};
-use crate::report::{FingerprintEntry, PatchAgreement, Report, SignAgreement, explain::SECRET_SIGNS};
+use super::page::{count, section, sentence, table};
+use crate::report::{
+    FingerprintEntry, PatchAgreement, Report, SignAgreement,
+    explain::{self, SECRET_SIGNS},
+};
 use maud::{Markup, html};
 
 pub fn fingerprint(report: &Report) -> Markup {
@@ -9,7 +12,16 @@ pub fn fingerprint(report: &Report) -> Markup {
         None => html! { p { "Nothing was observed, so there are no signs to show." } },
         Some(fingerprint) => agreement(fingerprint),
     };
-    section("The secret signs", &content)
+    let likelihood = explain::likelihood(report);
+    html! {
+        (section("The secret signs", &content))
+        @if !likelihood.is_empty() {
+            (section("Whose copy it is: likelihood ratios", &html! {
+                ul { @for text in &likelihood[..2] { li { (text) } } }
+                p { @for text in &likelihood[2..] { (sentence(text)) } }
+            }))
+        }
+    }
 }
 
 fn agreement(fingerprint: &FingerprintEntry) -> Markup {

@@ -2,7 +2,7 @@
 //! to repeat it.
 
 use super::page::{count, counted, section};
-use crate::report::{Report, explain};
+use crate::report::{Report, error_rates::error_rates, explain};
 use maud::{Markup, html};
 use meshmark_detection::{
     Observations,
@@ -13,6 +13,7 @@ pub fn limits(report: &Report) -> Markup {
     html! {
         (section("What was not tested", &list(&explain::not_tested(report))))
         (section("What would weaken this finding", &list(&weaknesses(report))))
+        (section("How often such findings are wrong", &list(&error_rates(report))))
         (section("Five words", &glossary()))
         @if let Some(provenance) = &report.provenance {
             @let deposit = explain::deposit(&provenance.inputs, report);

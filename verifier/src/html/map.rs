@@ -7,7 +7,7 @@ use super::{
 };
 use crate::report::{Evidence, Report};
 use maud::{Markup, html};
-use meshmark_detection::decision::Verdict;
+use meshmark_detection::{Observations, decision::Verdict};
 use std::fmt::Write as _;
 
 /// Classes of patches: the score from which a class begins, standard deviations, its name and its
@@ -19,6 +19,9 @@ const CLASSES: [(f64, &str, &str); 5] = [
     (4.0, "e2", "4 to 8"),
     (8.0, "e3", "8 or more"),
 ];
+
+/// A patch of which fewer vertices were found is not coloured, as it shows nothing by itself.
+const FEW: usize = 5;
 
 pub fn evidence(report: &Report) -> Markup {
     let Some(evidence) = &report.evidence else { return html! {} };
@@ -59,12 +62,14 @@ fn class(score: Option<f64>) -> &'static str {
 
 fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
     let places = &evidence.sketch.patches;
-    let score = |patch: usize| evidence.patch_scores.get(patch).copied().flatten();
+    let counts_vertices = report.parameters.observations == Some(Observations::Vertices);
+    let is_few = |patch: usize| counts_vertices && (1..FEW).contains(&places[patch].matched);
+    let score = |patch: usize| evidence.patch_scores.get(patch).copied().flatten().filter(|_| !is_few(patch));
     let scored = !evidence.patch_scores.is_empty();
     let drawing = html! {
         svg.map viewBox=(frame.view_box()) role="img" aria-label="Map of the reference, patches by their evidence" {
             @for (number, place) in places.iter().enumerate() {
-                path class=(if scored { class(score(number)) } else { "plain" })
+                path class=(if scored && is_few(number) { "e0" } else if scored { class(score(number)) } else { "plain" })
                     d=(frame.path(std::iter::once(&place.outline), true)) {}
             }
             (frame.lines(&evidence.sketch.lines))
@@ -89,6 +94,11 @@ fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
             @else {
                 "Of the " (counted(seen.len(), "patch")) " that " @if seen.len() == 1 { "was" } @else { "were" } " seen, "
                 (count(seen.iter().filter(|s| **s >= 2.0).count())) " reached 2 alone."
+            }
+            @let few = (0..places.len()).filter(|patch| is_few(*patch)).count();
+            @if few > 0 {
+                " In " (counted(few, "patch")) " fewer than " (FEW) " vertices were found, which show nothing by themselves: no "
+                "number is given there."
             }
             (legend(evidence))
         } @else {

@@ -82,6 +82,7 @@ fn mark(report: &Report) -> Markup {
             }
             (_, Some(recipient), _) => { "the copy made for “" span.name { (clipped(recipient)) } "”" }
             (_, None, Some(message)) => { "the copy with the message " code { (message) } }
+            _ if report.candidates.is_some() => { "the one copy that was tried" }
             _ if report.is_of_somebody() => { "the copy that the record is of" }
             _ => { "key " code { (p.key_id) } }
         }

@@ -19,6 +19,8 @@ pub struct Inputs {
     pub key: Digested,
     /// The reference.
     pub reference: Digested,
+    /// The other references that were given, such as those of earlier editions.
+    pub other_references: Vec<Digested>,
     /// The suspect.
     pub suspect: Digested,
     /// The record, or the best one of many; null without.
@@ -73,9 +75,11 @@ impl<'a> Digests<'a> {
             return Err(Error::SuspectChanged { path: suspect.original().into() });
         }
         let best_record = best_record.map(digest).transpose()?;
-        let reference = references.into_iter().find(|(path, _)| *path == reference);
-        let (_, reference) = reference.expect("the verification has one of the references");
-        Ok(Inputs { key, reference, suspect: examined, record: record.or(best_record) })
+        let (own, others): (Vec<_>, Vec<_>) =
+            references.into_iter().partition(|(path, _)| *path == reference);
+        let (_, reference) = own.into_iter().next().expect("the verification has one of the references");
+        let other_references = others.into_iter().map(|(_, digested)| digested).collect();
+        Ok(Inputs { key, reference, other_references, suspect: examined, record: record.or(best_record) })
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{
     belonging_files::has_logs,
     gdal_failures::{GdalFailure, Names, forget_failure, last_failure, named_as},
-    journal,
+    journal, plain,
     private_copy::PrivateCopy,
 };
 use crate::{Error, Result};
@@ -146,6 +146,7 @@ fn check_fields(path: &Path, dataset: &Dataset, names: &[String]) -> Result<()> 
 }
 
 fn open(what: &'static str, path: &Path) -> Result<Dataset> {
+    plain::check(what, path)?;
     if holds_password(path) {
         return Err(Error::Password { what });
     }

@@ -8,6 +8,7 @@ pub mod gdal_failures;
 mod journal;
 pub mod maps;
 pub mod passphrase;
+pub mod plain;
 pub mod private_copy;
 mod suspect_formats;
 pub mod suspects;

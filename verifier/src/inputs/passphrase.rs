@@ -75,7 +75,11 @@ impl Passphrase {
             }
             Source::Parent => first_line(io::stdin()).map_err(|source| Error::NoTerminal { source })?,
         };
-        if text.is_empty() { Err(Error::NoPassphrase) } else { Ok(text) }
+        match text.len() as u64 {
+            0 => Err(Error::NoPassphrase),
+            1..=LONGEST_PASSPHRASE => Ok(text),
+            _ => Err(Error::LongPassphrase { most: LONGEST_PASSPHRASE }),
+        }
     }
 
     /// Returns the text that a protected text holds; any other text as it is.
@@ -122,11 +126,11 @@ fn asked(question: &str) -> Result<Zeroizing<String>> {
 
 fn first_line(source: impl Read) -> io::Result<Zeroizing<String>> {
     let mut line = Zeroizing::new(String::new());
-    io::BufReader::new(source.take(LONGEST_PASSPHRASE)).read_line(&mut line)?;
+    io::BufReader::new(source.take(2 * LONGEST_PASSPHRASE)).read_line(&mut line)?;
     Ok(Zeroizing::new(line.trim_end_matches(['\n', '\r']).into()))
 }
 
-/// A mistaken /dev/zero has no end.
+/// Bytes of the longest passphrase; a mistaken /dev/zero has no end.
 const LONGEST_PASSPHRASE: u64 = 4096;
 
 /// Returns whether a file holds a protected key. A pipe can be read once only, by the child.

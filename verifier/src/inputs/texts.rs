@@ -1,6 +1,6 @@
 //! Files of keys, records and deposits.
 
-use super::passphrase::Passphrase;
+use super::{passphrase::Passphrase, plain};
 use crate::{Error, Result};
 use meshmark_core::{
     hex,
@@ -11,7 +11,6 @@ use meshmark_marking::exposure;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::{
-    fs::File,
     io::{self, Read},
     path::{Path, PathBuf},
 };
@@ -43,7 +42,7 @@ pub fn secret(
 
 fn secret_and_exposure(what: &'static str, path: &Path) -> Result<(Zeroizing<String>, Option<String>)> {
     let unread = |source| Error::TextUnread { what, path: path.into(), source };
-    let file = File::open(path).map_err(unread)?;
+    let file = plain::open(path).map_err(unread)?;
     let exposed = exposure(path, &file);
     Ok((read_text(file).map_err(unread)?, exposed))
 }
@@ -57,7 +56,7 @@ pub fn small(what: &'static str, path: &Path) -> Result<Zeroizing<String>> {
 pub fn bytes(what: &'static str, path: &Path) -> Result<Vec<u8>> {
     let read = || {
         let mut bytes = Vec::new();
-        let file = File::open(path)?;
+        let file = plain::open(path)?;
         match file.take(MOST_BYTES + 1).read_to_end(&mut bytes)? as u64 {
             0..=MOST_BYTES => Ok(bytes),
             _ => Err(io::Error::other(format!("it is longer than {MOST_BYTES} bytes"))),
@@ -144,5 +143,5 @@ fn claims_to_be_record(text: &str) -> bool {
 }
 
 fn text(path: &Path) -> io::Result<Zeroizing<String>> {
-    File::open(path).and_then(read_text)
+    plain::open(path).and_then(read_text)
 }

@@ -19,6 +19,16 @@ pub enum Format {
     Json,
 }
 
+impl Format {
+    /// Returns the ending of the name of such a file.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Format::Html => "html",
+            Format::Json => "json",
+        }
+    }
+}
+
 /// What the file is, in messages.
 const REPORT: &str = "report";
 

@@ -37,12 +37,15 @@ pub struct Entry {
 }
 
 impl Candidates {
-    /// Returns what a report file holds, which others read: no name of a recipient whose record does
-    /// not match, but for the nearest one where none does.
-    pub(crate) fn into_file(mut self) -> Self {
-        let others = self.list.split_off(self.matches.max(1).min(self.list.len()));
+    /// Returns the best one, which may be hidden from the list.
+    pub fn best(&self) -> Option<&Entry> {
+        self.list.first()
+    }
+
+    /// Takes all that do not match from the list: their names are those of other customers.
+    pub(crate) fn hide_others(&mut self) {
+        let others = self.list.split_off(self.matches.min(self.list.len()));
         self.next_p_value_log10 = others.first().map_or(self.next_p_value_log10, |next| next.p_value_log10);
-        self
     }
 
     /// Returns lines of text.
@@ -57,7 +60,13 @@ impl Candidates {
             format!("{label:<13} {}{p}", entry.name())
         };
         match self.matches {
-            0 => lines.extend(self.list.first().map(|nearest| line("nearest:", nearest))),
+            0 => lines.push(match (self.list.first(), self.next_p_value_log10) {
+                (Some(nearest), _) => line("nearest:", nearest),
+                (None, Some(p)) => {
+                    format!("nearest:      p-value {}; --show-recipients names it", power_of_ten(p))
+                }
+                (None, None) => return lines,
+            }),
             matches => lines.extend(self.list[..matches].iter().map(|entry| line("match:", entry))),
         }
         lines

@@ -1,8 +1,11 @@
 //! The output of `--explain`: the report in sentences, for readers who depend on it.
 
-use super::{DepositEntry, FingerprintEntry, MarkParameters, PatchAgreement, Report, Standing};
+use super::{
+    DepositEntry, FingerprintEntry, LikelihoodEntry, MarkParameters, PatchAgreement, Report, Standing,
+    error_rates::error_rates,
+};
 use crate::{
-    inputs::digests::Inputs,
+    inputs::digests::{Digested, Inputs},
     words::{clipped, power_of_ten},
 };
 use meshmark_core::counted;
@@ -14,12 +17,14 @@ pub fn explain(inputs: &Inputs, report: &Report) -> String {
     let sections = [
         ("What was compared", compared(inputs, report)),
         ("What was found", found(report)),
+        ("What that says about whose copy it is", likelihood(report)),
         (what_is_bound(report), bound(report)),
         ("What was not tested", not_tested(report)),
+        ("How often such findings are wrong", error_rates(report)),
         ("What makes this evidence", deposit(inputs, report)),
     ];
     let mut text = String::new();
-    for (title, sentences) in sections {
+    for (title, sentences) in sections.into_iter().filter(|(_, sentences)| !sentences.is_empty()) {
         let _ = writeln!(text, "{title}");
         sentences.iter().for_each(|sentence| {
             let _ = writeln!(text, "  {sentence}");
@@ -58,6 +63,10 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
     ];
     sentences.push(match &inputs.record {
         Some(record) => format!("The record {} belongs to this key and this reference.", record.path),
+        None if report.candidates.is_some() => {
+            "Records of this key and this reference were tried; none of them matches, and none is named."
+                .into()
+        }
         None => "There was no record: how the map was marked was taken from the command line.".into(),
     });
     sentences.push(format!("File of the suspect: {}. {UNTOUCHED}", inputs.suspect.digest));
@@ -97,6 +106,8 @@ pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
         format!("File of the reference: {}.", inputs.reference.digest),
         format!("File of the key: {}; its id is {}.", inputs.key.digest, report.parameters.key_id),
     ];
+    let other = |other: &Digested| format!("File of the other reference {}: {}.", other.path, other.digest);
+    sentences.extend(inputs.other_references.iter().map(other));
     let record = inputs.record.as_ref();
     sentences.extend(record.map(|record| format!("File of the record: {}.", record.digest)));
     let standing = report.deposit.iter().map(|entry| &entry.standing);
@@ -134,6 +145,11 @@ pub(crate) fn not_tested(report: &Report) -> Vec<String> {
     ]
     .map(String::from)
     .to_vec()
+}
+
+/// Returns sentences about the likelihood ratios; none where there are none.
+pub(crate) fn likelihood(report: &Report) -> Vec<String> {
+    report.likelihood.iter().flat_map(LikelihoodEntry::to_sentences).collect()
 }
 
 fn found(report: &Report) -> Vec<String> {

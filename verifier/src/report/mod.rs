@@ -4,11 +4,13 @@
 mod candidates;
 mod case;
 mod deposit;
+pub(crate) mod error_rates;
 mod evidence;
 mod evidence_map;
 pub(crate) mod explain;
 mod extent;
 mod fingerprint;
+mod likelihood;
 pub mod sketch;
 mod text;
 
@@ -20,6 +22,7 @@ pub use evidence_map::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidenc
 pub use explain::explain;
 pub use extent::Extent;
 pub use fingerprint::{FingerprintEntry, PatchAgreement, SignAgreement};
+pub use likelihood::LikelihoodEntry;
 
 use crate::{ExitCode, words::printable};
 use meshmark_core::{
@@ -76,6 +79,9 @@ pub struct Report {
     pub null_hypothesis: Option<Null>,
     /// log₁₀ of the p-value of this much evidence for any message under a random key.
     pub p_any_message_log10: Option<f64>,
+    /// The likelihood ratios of the recipient; null where the mark is a message, and where nothing was
+    /// observed or no recipient is named.
+    pub likelihood: Option<LikelihoodEntry>,
     /// The records that were tried; null when the request names one mark.
     pub candidates: Option<Candidates>,
     /// The case, from a case file; null without one.
@@ -210,11 +216,18 @@ impl Report {
         serde_json::to_string_pretty(self).expect("numbers and strings are JSON") + "\n"
     }
 
-    /// Returns the report as a file holds it, which is the same for the same input and which others
-    /// read.
+    /// Returns the report as a file holds it, which is the same for the same input.
     pub fn into_file(self) -> Self {
-        let candidates = self.candidates.map(Candidates::into_file);
-        Report { seconds: None, candidates, ..self }
+        Report { seconds: None, ..self }
+    }
+
+    /// Hides the names of recipients whose records were tried and do not match.
+    pub fn hide_others(&mut self) {
+        let Some(candidates) = &mut self.candidates else { return };
+        candidates.hide_others();
+        if candidates.matches == 0 {
+            self.parameters.recipient = None;
+        }
     }
 
     /// Returns the exit code of this verdict.

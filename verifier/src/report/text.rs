@@ -1,6 +1,6 @@
 //! The report as a short text.
 
-use super::{Certainty, Faults, Report};
+use super::{Certainty, Faults, LikelihoodEntry, Report};
 use crate::words::power_of_ten;
 use meshmark_core::{code::Decoder, counted};
 use meshmark_detection::{
@@ -34,6 +34,7 @@ impl Report {
         }
         lines.extend(self.fingerprint.iter().flat_map(|fingerprint| fingerprint.to_lines()));
         lines.extend(self.p_value_lines());
+        lines.extend(self.likelihood.iter().flat_map(LikelihoodEntry::to_lines));
         let v = &self.vertices;
         lines.push(format!(
             "vertices:     {} of {} reference vertices found within {} m{} among {} of the suspect{}",
@@ -156,7 +157,7 @@ impl Report {
 
     /// Returns whether a copy was sought, and not a key alone.
     pub(crate) fn is_of_somebody(&self) -> bool {
-        self.null_hypothesis.is_some() || self.parameters.recipient.is_some()
+        self.null_hypothesis.is_some() || self.parameters.recipient.is_some() || self.candidates.is_some()
     }
 
     pub(crate) fn verdict_name(&self) -> &'static str {

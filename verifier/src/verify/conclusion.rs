@@ -8,8 +8,8 @@ use super::{
     request::{Request, Sought},
 };
 use crate::report::{
-    Certainty, CodeEntry, Evidence, FingerprintEntry, MarkParameters, Member, PatchAgreement, Report,
-    ReportParameters, SignAgreement,
+    Certainty, CodeEntry, Evidence, FingerprintEntry, LikelihoodEntry, MarkParameters, Member,
+    PatchAgreement, Report, ReportParameters, SignAgreement,
 };
 use meshmark_core::{carrier::Carrier, fingerprint_record::FingerprintShape, message::Message};
 use meshmark_detection::{
@@ -135,6 +135,7 @@ pub fn conclude_fingerprint(
         p_recipient_log10: p(standing.p_alone_log10),
         p_missed_log10: answer.p_missed_log10,
         fingerprint: Some(fingerprint),
+        likelihood: Some(LikelihoodEntry::new(answer.likelihood)),
         ..report(
             request,
             seen,
@@ -196,6 +197,7 @@ fn report(
         p_missed_log10: None,
         null_hypothesis: None,
         p_any_message_log10: None,
+        likelihood: None,
         candidates: None,
         case: None,
         deposit: None,

@@ -49,6 +49,8 @@ pub struct FingerprintEvidence {
     pub parts: Parts,
     /// The standing of each recipient, and the answer about it.
     pub recipients: Vec<(Standing, Answer)>,
+    /// What the answers rest on.
+    pub grounds: Grounds,
     /// The agreement of the key's pilots.
     pub pilots: Agreement,
     /// Scores of decoy recipients; none where no displacement was observed.
@@ -142,8 +144,8 @@ fn of_fingerprints(
     let (suspect, reference) = (&matched.suspect.vertices, &matched.reference.data.vertices);
     let decoys = |evidence| Decoys::of_signs(evidence, suspect, reference);
     let (recipient_decoys, key_decoys) = (decoys(&evidence), decoys(&of_pilots));
-    let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
-    let grounds = Grounds::new(&evidence, of_pilots, power, (tried, significance));
+    let seen_of_key = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
+    let grounds = Grounds::new([&evidence, &of_pilots], seen_of_key, power, (tried, significance));
     let mut standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
     if grounds.ask_for_shares(&standings) {
         matched.look_for_shares(
@@ -168,8 +170,16 @@ fn of_fingerprints(
     let noise_m = deformation.noise_m;
     let surroundings =
         Surroundings { radius, matches, deformation: Some(deformation), weights, observations };
-    let found =
-        FingerprintEvidence { estimates, parts, recipients, pilots, recipient_decoys, key_decoys, noise_m };
+    let found = FingerprintEvidence {
+        estimates,
+        parts,
+        recipients,
+        grounds,
+        pilots,
+        recipient_decoys,
+        key_decoys,
+        noise_m,
+    };
     Ok((Found::Fingerprint(found), surroundings))
 }
 

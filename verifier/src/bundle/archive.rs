@@ -1,0 +1,96 @@
+//! The archive of a bundle: files without compression and without times, in a fixed order.
+
+use super::{JSON, MANIFEST, Manifest, PAGE};
+use crate::{Error, Result, inputs::texts};
+use std::{
+    collections::BTreeMap,
+    io::{Cursor, Read, Write},
+    path::Path,
+};
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, result::ZipError, write::SimpleFileOptions};
+
+/// The files of a bundle.
+#[derive(Debug, PartialEq)]
+pub struct Bundle {
+    manifest: Manifest,
+    files: BTreeMap<String, Vec<u8>>,
+}
+
+impl Bundle {
+    /// Collects the two forms of a report and what vouches for them.
+    ///
+    /// # Errors
+    /// Fails when an enclosed file cannot be read.
+    pub fn new(manifest: Manifest, page: String, json: String) -> Result<Self> {
+        let mut files = BTreeMap::from([
+            (PAGE.to_string(), page.into_bytes()),
+            (JSON.to_string(), json.into_bytes()),
+            (MANIFEST.to_string(), manifest.to_json()),
+        ]);
+        for input in manifest.enclosed() {
+            files.insert(input.path.clone(), texts::bytes("input", Path::new(&input.path))?);
+        }
+        Ok(Bundle { manifest, files })
+    }
+
+    /// Returns the archive.
+    ///
+    /// # Errors
+    /// Fails on a name that no archive can hold.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let packed = || -> std::result::Result<Vec<u8>, ZipError> {
+            let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+            let options = SimpleFileOptions::default()
+                .compression_method(CompressionMethod::Stored)
+                .last_modified_time(DateTime::default())
+                .unix_permissions(0o644);
+            for (name, bytes) in &self.files {
+                archive.start_file(name.as_str(), options)?;
+                archive.write_all(bytes)?;
+            }
+            Ok(archive.finish()?.into_inner())
+        };
+        packed().map_err(|error| Error::unwritten("the bundle", std::io::Error::other(error)))
+    }
+
+    /// Reads an archive.
+    ///
+    /// # Errors
+    /// Fails on a file that is no bundle.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = texts::bytes("bundle", path)?;
+        unpacked(bytes).map_err(|reason| Error::NoBundle { path: path.into(), reason })
+    }
+
+    /// Returns the manifest.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Returns the number of its files.
+    pub fn count(&self) -> usize {
+        self.files.len()
+    }
+
+    /// Returns the names of the files that are not the same in another bundle.
+    pub fn differing<'a>(&'a self, other: &'a Bundle) -> Vec<&'a str> {
+        let names =
+            self.files.keys().chain(other.files.keys().filter(|name| !self.files.contains_key(*name)));
+        names.filter(|name| self.files.get(*name) != other.files.get(*name)).map(String::as_str).collect()
+    }
+}
+
+fn unpacked(bytes: Vec<u8>) -> std::result::Result<Bundle, String> {
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    let mut files = BTreeMap::new();
+    for number in 0..archive.len() {
+        let mut file = archive.by_index(number).map_err(|error| error.to_string())?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        let name = file.name().map_err(|error| error.to_string())?.into_owned();
+        files.insert(name, bytes);
+    }
+    let manifest = files.get(MANIFEST).ok_or("it has no manifest.json")?;
+    let manifest = Manifest::from_json(manifest).map_err(|reason| format!("its manifest.json: {reason}"))?;
+    Ok(Bundle { manifest, files })
+}
