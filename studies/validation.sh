@@ -35,6 +35,7 @@ for study in $studies; do
     if [ ! -e "$out/$study/$study.md" ]; then
         # shellcheck disable=SC2086 # the size is two or more words
         "$tools/$study" --out "$out/$study.part" --seed "$seed" ${size[$study]} "$@" >&2
+        echo "${size[$study]} $(basename -a "$@" | paste -sd ' ')" >"$out/$study.part/arguments"
         mv "$out/$study.part" "$out/$study"
     fi
 done
@@ -57,7 +58,7 @@ runs of the studies of [false alarms](evaluation.md#false-alarms) and [misses](e
 [security](security.md) those of coalitions.
 END
     for study in $studies; do
-        printf '\n## %s\n\n`%s --seed %s %s`: ' "${question[$study]}" "$study" "$seed" "${size[$study]}"
+        printf '\n## %s\n\n`%s --seed %s %s`: ' "${question[$study]}" "$study" "$seed" "$(<"$out/$study/arguments")"
         cat "$out/$study/$study.md"
     done
 } >"$out/validation.md"

@@ -18,6 +18,8 @@ use std::{
 use tempfile::TempDir;
 use zip::ZipArchive;
 
+type Change<'a> = &'a dyn Fn(&Auditor);
+
 /// What the one who makes a bundle hands to the one who makes it again.
 const INPUTS: [&str; 4] = ["key.json", "map.gpkg", "records/acme.json", "suspect.gpkg"];
 const PUBLIC: [&str; 5] = ["authorities.pem", "case.toml", "key.public.pem", "series.deposit", "series.tsr"];
@@ -116,7 +118,7 @@ fn an_auditor_on_a_clean_machine_makes_the_bundle_again_and_finds_every_change()
     let (code, text) = auditor.repeat();
     assert!(code == Some(0) && text.contains("8 files, byte by byte"), "{text}");
 
-    let changes: [(&str, &dyn Fn(&Auditor)); 7] = [
+    let changes: [(&str, Change); 7] = [
         ("key.json is another one", &|auditor| auditor.change("key.json", "{", "{ ")),
         ("records/acme.json is another one", &|auditor| auditor.change("records/acme.json", "{", "{ ")),
         ("map.gpkg is another one", &|auditor| {

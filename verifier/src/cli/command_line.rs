@@ -48,7 +48,7 @@ pub fn repeatable(arguments: impl Iterator<Item = String>) -> Vec<String> {
         match word.as_str() {
             name if WITH_VALUE.contains(&name) => drop(options.next()),
             "--json" | "--explain" => {}
-            _ if WITH_VALUE.iter().any(|name| is_output(&name)) => {}
+            _ if WITH_VALUE.iter().any(is_output) => {}
             _ => kept.push(word),
         }
     }

@@ -14,7 +14,11 @@ use meshmark_verifier::{
     deposit::Expected,
     html,
     inputs::{
-        case_file, digests::Digests, gdal_failures, private_copy::PrivateCopy, versions::versions_and_program,
+        case_file,
+        digests::{Digests, Inputs},
+        gdal_failures,
+        private_copy::PrivateCopy,
+        versions::versions_and_program,
     },
     outputs::{EvidenceMapFile, Format, NewFile, ReportFile, write_evidence_map},
     progress::{Bar, Progress},
@@ -59,22 +63,29 @@ pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
         target.publish(&handover.evidence_map())?;
     }
     print(&answer)?;
+    publish(&handover, file, bundle.zip(manifest))?;
+    Ok(code)
+}
+
+/// Publishes the report file and the bundle, which the manifest describes, where a child passed what they
+/// consist of.
+fn publish(handover: &Handover, file: Option<ReportFile>, bundle: Option<(NewFile, Manifest)>) -> Result<()> {
     let report = |format: Format| passed(&handover.report(format.ending()));
     if let Some(file) = file
         && let Some(text) = report(file.format())?
     {
         file.write(&text)?;
     }
-    if let Some((bundle, before)) = bundle.zip(manifest)
+    if let Some((bundle, manifest)) = bundle
         && let (Some(page), Some(json)) = (report(Format::Html)?, report(Format::Json)?)
     {
-        let changed = before.other_inputs();
+        let changed = manifest.other_inputs();
         if !changed.is_empty() {
             return Err(Error::InputChanged { what: changed.join("; ") });
         }
-        bundle.write(&Bundle::new(before, page, json)?.to_bytes()?)?;
+        bundle.write(&Bundle::new(manifest, page, json)?.to_bytes()?)?;
     }
-    Ok(code)
+    Ok(())
 }
 
 /// Describes the inputs of this command.
@@ -178,9 +189,13 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     if explain {
         answer += &format!("\n{}", report::explain(&inputs, &report));
     }
-    if formats.is_empty() {
-        return Ok(Examined { answer, reports: Vec::new(), code });
-    }
+    let report = Report { evidence, case, ..report.into_file() };
+    let reports = written(report, inputs, &formats)?;
+    Ok(Examined { answer, reports, code })
+}
+
+/// Returns a report in these forms, with the means to repeat it.
+fn written(report: Report, inputs: Inputs, formats: &[Format]) -> Result<Vec<(Format, String)>> {
     let provenance = Provenance {
         inputs,
         reference_vertices_sha256: report.reference_digest.clone(),
@@ -188,10 +203,10 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
         command: command_line::own(),
         versions: versions_and_program()?,
     };
-    let report = Report { provenance: Some(provenance), evidence, case, ..report.into_file() };
-    let written = |format: Format| match format {
-        Format::Html => (format, html::verification(&report)),
-        Format::Json => (format, report.to_json()),
+    let report = Report { provenance: Some(provenance), ..report };
+    let text = |format: &Format| match format {
+        Format::Html => html::verification(&report),
+        Format::Json => report.to_json(),
     };
-    Ok(Examined { answer, reports: formats.into_iter().map(written).collect(), code })
+    Ok(formats.iter().map(|format| (*format, text(format))).collect())
 }
