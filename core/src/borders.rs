@@ -52,8 +52,12 @@ impl Coverage {
     }
 
     fn meets(&self, lower: [f64; 2], upper: [f64; 2]) -> bool {
+        self.is_beside(lower, upper) && self.cells(lower, upper).any(|cell| self.is_covered[cell])
+    }
+
+    /// Returns whether its extent touches a box.
+    fn is_beside(&self, lower: [f64; 2], upper: [f64; 2]) -> bool {
         (0..2).all(|axis| lower[axis] <= self.upper[axis] && self.lower[axis] <= upper[axis])
-            && self.cells(lower, upper).any(|cell| self.is_covered[cell])
     }
 }
 
@@ -81,7 +85,12 @@ struct NearSegment {
 impl Border {
     /// Finds what of a sheet may be near the others, given where these have something.
     pub fn new(map: &Map, tolerance_m: f64, others: &[&Coverage]) -> Self {
-        let is_near = |(lower, upper)| others.iter().any(|other| other.meets(lower, upper));
+        let (lower, upper) = map.vertices.bounds();
+        // A unit is the shortest at a corner of the extent, or hardly longer there.
+        let [p, q] = [lower, upper].map(|corner| reach(map.measure, corner, tolerance_m));
+        let (lower, upper) = bounds([lower, upper], [0, 1].map(|axis| 2.0 * p[axis].max(q[axis])));
+        let beside: Vec<_> = others.iter().filter(|other| other.is_beside(lower, upper)).collect();
+        let is_near = |(lower, upper)| beside.iter().any(|other| other.meets(lower, upper));
         let vertex = |(index, &at): (u32, &[f64; 2])| {
             let reach = reach(map.measure, at, tolerance_m);
             is_near(bounds([at, at], reach)).then_some(NearVertex { index, at, reach })
