@@ -21,7 +21,7 @@ QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
 .PHONY: build test test-studies demo bench table2 coalitions false-alarms calibration validation faults \
-	fuzz fuzz-build sanitizers quality conformance hosts newcomer qgis plugin-for-wheel wheel deb install \
+	fuzz sanitizers quality conformance hosts newcomer qgis plugin-for-wheel wheel deb install \
 	uninstall fixtures deps lint
 
 build: deps
@@ -98,9 +98,6 @@ faults: build
 # Every fuzz target for so long, side by side: make fuzz SECONDS=600 TARGETS="key record".
 fuzz: deps
 	$(WITH_GDAL) CARGO=$(CARGO) fuzz/run.sh $(or $(SECONDS),60) $(TARGETS)
-
-fuzz-build: deps
-	$(WITH_GDAL) CARGO=$(CARGO) fuzz/build.sh $(TARGETS)
 
 # The driver under AddressSanitizer, UndefinedBehaviorSanitizer and valgrind.
 sanitizers: build
