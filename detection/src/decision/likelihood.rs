@@ -142,7 +142,8 @@ impl Ratios {
     /// Returns ratios, natural logarithms, as they are stated: rounded down to one decimal of log₁₀.
     fn stated(another_recipient_ln: f64, no_copy_ln: f64) -> Self {
         let stated = |ln: f64| (ln / LN_10).clamp(LEAST_LOG10, MOST_LOG10);
-        let rounded = |log10: f64| (log10 * 10.0).floor() / 10.0 + 0.0;
+        // A ratio of 1 stays one whatever its last digit.
+        let rounded = |log10: f64| (log10 * 10.0 + 1e-6).floor() / 10.0 + 0.0;
         let [another_recipient_log10, no_copy_log10] =
             [another_recipient_ln, no_copy_ln].map(|ln| rounded(stated(ln)));
         Ratios { another_recipient_log10, no_copy_log10 }
@@ -246,7 +247,7 @@ mod tests {
         assert_eq!(laws.ratios(&standing(1, 2.0)), laws.ratios_of_score(2.0));
         let later = laws.ratios(&standing(2, 6.0)).another_recipient_log10;
         let from_p = (-(p_log10(6.0) + 6f64.log10()) / 2.0 - 2f64.log10()) * 10.0;
-        assert_eq!(later, from_p.floor() / 10.0);
+        assert_eq!(later, (from_p + 1e-6).floor() / 10.0);
         let of_share = Standing { is_of_share: true, p_alone_log10: -20.0, ..standing(1, 2.0) };
         assert_eq!(laws.ratios(&of_share).another_recipient_log10, MOST_LOG10);
     }
