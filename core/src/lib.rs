@@ -77,6 +77,7 @@ mod response;
 pub mod scale;
 mod sides;
 pub mod signs;
+mod slicing;
 pub mod spectrum;
 pub mod stiffness;
 mod topology;
