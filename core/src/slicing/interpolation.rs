@@ -16,10 +16,10 @@ const CROWDED: f64 = 0.15;
 /// Steps towards its root; every third one is a bisection.
 const STEPS: usize = 30;
 /// The last steps are shorter than this share of the distance of the shifts.
-const NARROW: f64 = 1e-7;
+const NARROW: f64 = 1e-5;
 
 /// A guess is good when a node is closer than this share of the distance to the next eigenvalue.
-const CLOSE: f64 = 3e-3;
+const CLOSE: f64 = 3e-2;
 /// Determinants between eigenvalues closer than this, relative to the norm of the matrix, are
 /// computed in double precision.
 const NARROW_GAP: f64 = 1e-4;

@@ -72,6 +72,51 @@ pub fn subtract_product<T: Real>(from: &mut Lanes<T>, a: &Lanes<T>, b: &Lanes<T>
     }
 }
 
+/// Adds the product of two lanes to a third.
+#[inline(always)]
+pub fn add_product(to: &mut Lanes<f64>, a: &Lanes<f64>, b: &Lanes<f64>) {
+    for lane in 0..LANES {
+        to[lane] += a[lane] * b[lane];
+    }
+}
+
+/// Returns the product of two lanes.
+#[inline(always)]
+pub fn product<T: Real>(a: &Lanes<T>, b: &Lanes<T>) -> Lanes<T> {
+    let mut product = *a;
+    for lane in 0..LANES {
+        product[lane] = product[lane] * b[lane];
+    }
+    product
+}
+
+/// Returns the same numbers in double precision.
+#[inline(always)]
+pub fn double<T: Real>(lanes: &Lanes<T>) -> Lanes<f64> {
+    let mut double = [0.0; LANES];
+    for lane in 0..LANES {
+        double[lane] = lanes[lane].double();
+    }
+    double
+}
+
+/// Rounds numbers.
+#[inline(always)]
+pub fn rounded<T: Real>(lanes: &Lanes<f64>) -> Lanes<T> {
+    let mut rounded = [T::default(); LANES];
+    for lane in 0..LANES {
+        rounded[lane] = T::rounded(lanes[lane]);
+    }
+    rounded
+}
+
+/// Keeps the compiler from vectorising a loop over rows, whose numbers for a lane are far apart in
+/// memory, instead of the lanes of a row.
+#[inline(always)]
+pub fn one_row_at_a_time() {
+    std::hint::black_box(());
+}
+
 /// Applies `f` to every item, and to the last one in the remaining lanes.
 #[inline(always)]
 pub fn spread<T, U>(items: &[T], f: impl Fn(&T) -> U) -> Lanes<U> {

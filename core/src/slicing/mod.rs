@@ -66,3 +66,74 @@ pub fn lowest(matrix: &SparseSymmetric, count: usize, least_gap: f64) -> Option<
     orthogonalise(&solution.values, &mut solution.vectors, CLOSE * slicer.norm());
     Some((solution.values, solution.vectors))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A grid of `side`² vertices, every cell with one of its diagonals, with these weights.
+    fn mesh(side: u32, weights: &[f64]) -> SparseSymmetric {
+        let at = |x: u32, y: u32| y * side + x;
+        let mut edges = Vec::new();
+        for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+            let right = (x + 1 < side).then(|| [at(x, y), at(x + 1, y)]);
+            let up = (y + 1 < side).then(|| [at(x, y), at(x, y + 1)]);
+            let across = (x + 1 < side && y + 1 < side).then(|| [at(x, y), at(x + 1, y + 1)]);
+            edges.extend([right, up, across].into_iter().flatten());
+        }
+        let weighted = || edges.iter().zip(weights.iter().cycle());
+        let mut diagonal = vec![0.0; (side * side) as usize];
+        for ([a, b], weight) in weighted() {
+            diagonal[*a as usize] += weight;
+            diagonal[*b as usize] += weight;
+        }
+        SparseSymmetric::new(diagonal, weighted().map(|(&edge, &weight)| (edge, -weight)))
+    }
+
+    fn values_of_nalgebra(matrix: &SparseSymmetric) -> Vec<f64> {
+        let (n, dense) = (matrix.size(), matrix.to_dense());
+        let mut values = nalgebra::DMatrix::from_fn(n, n, |i, j| dense[(i, j)]).symmetric_eigenvalues();
+        values.as_mut_slice().sort_by(f64::total_cmp);
+        values.as_slice().to_vec()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn values_are_those_of_nalgebra_and_vectors_are_orthonormal(
+            side in 6..14u32,
+            weights in prop::collection::vec(0.2..1.0f64, 97),
+            share in 0.01..=1.0f64,
+        ) {
+            let matrix = mesh(side, &weights);
+            let count = ((matrix.size() as f64 * share) as usize).max(1);
+            let expected = values_of_nalgebra(&matrix);
+            let closest = expected.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::MAX, f64::min);
+            prop_assume!(closest > 1e-4);
+            // What is not proved is another solver's; proptest fails when it rejects most cases.
+            let solved = lowest(&matrix, count, 1e-8);
+            prop_assume!(solved.is_some());
+            let (values, vectors) = solved.unwrap();
+            prop_assert_eq!((values.len(), vectors.ncols()), (count, count));
+            for (value, expected) in values.iter().zip(&expected) {
+                prop_assert!((value - expected).abs() < 1e-12, "{} {}", value, expected);
+            }
+            let dense = matrix.to_dense();
+            let scaled = Mat::from_fn(matrix.size(), count, |i, j| vectors[(i, j)] * values[j]);
+            prop_assert!((dense * &vectors - scaled).norm_max() < 1e-12);
+            let overlaps = vectors.transpose() * &vectors - Mat::<f64>::identity(count, count);
+            prop_assert!(overlaps.norm_max() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn repeated_eigenvalues_are_left_to_another_solver() {
+        // A ring: all eigenvalues but the first and the last occur twice.
+        let ring = SparseSymmetric::new(vec![2.0; 36], (0..36).map(|i| ([i, (i + 1) % 36], -1.0)));
+        assert!(lowest(&ring, 10, 1e-8).is_none());
+        // The second and the third are equal; only the second is wanted.
+        assert!(lowest(&ring, 2, 1e-8).is_none());
+    }
+}

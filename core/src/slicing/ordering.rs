@@ -103,3 +103,45 @@ fn positions(bits: &[u64]) -> impl Iterator<Item = u32> {
         rest.take_while(|rest| *rest != 0).map(move |rest| 64 * number + rest.trailing_zeros())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn columns_are_what_elimination_fills_in(edges in prop::collection::btree_set((0..70u32, 0..70u32), 0..200)) {
+            let edges: std::collections::BTreeSet<[u32; 2]> =
+                edges.into_iter().filter(|(a, b)| a != b).map(|(a, b)| [a.min(b), a.max(b)]).collect();
+            let matrix = SparseSymmetric::new(vec![1.0; 70], edges.iter().map(|edge| (*edge, -1.0)));
+            let Ordering { order, columns } = Ordering::of_minimum_degree(&matrix, usize::MAX).unwrap();
+            let mut filled = vec![[false; 70]; 70];
+            for [a, b] in edges {
+                (filled[a as usize][b as usize], filled[b as usize][a as usize]) = (true, true);
+            }
+            let mut is_left = [true; 70];
+            for (vertex, column) in order.iter().zip(columns) {
+                let neighbours = |filled: &[[bool; 70]], of: usize| -> Vec<usize> {
+                    (0..70).filter(|&other| filled[of][other] && is_left[other]).collect()
+                };
+                let own = neighbours(&filled, *vertex as usize);
+                let fewest = (0..70).filter(|&v| is_left[v]).map(|v| neighbours(&filled, v).len()).min();
+                prop_assert_eq!(Some(own.len()), fewest);
+                let mut rows: Vec<usize> = column.iter().map(|&step| order[step as usize] as usize).collect();
+                rows.sort_unstable();
+                prop_assert_eq!(&rows, &own);
+                own.iter().for_each(|&a| own.iter().filter(|&&b| a != b).for_each(|&b| filled[a][b] = true));
+                is_left[*vertex as usize] = false;
+            }
+        }
+    }
+
+    #[test]
+    fn a_matrix_without_zeros_is_not_sparse() {
+        let all = (1..50u32).flat_map(|a| (0..a).map(move |b| ([b, a], 1.0)));
+        assert!(Ordering::of_minimum_degree(&SparseSymmetric::new(vec![1.0; 50], all), 1000).is_none());
+    }
+}

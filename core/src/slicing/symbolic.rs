@@ -4,14 +4,28 @@
 
 use super::{matrix::SparseSymmetric, ordering::Ordering};
 
+/// Columns of a panel, at most.
+pub const WIDEST_PANEL: usize = 4;
+
+/// Columns of L that follow each other and have the same rows below the panel (a part of a
+/// fundamental supernode). Their products are subtracted together, which saves memory accesses.
+#[derive(Debug, Clone, Copy)]
+pub struct Panel {
+    /// The first column.
+    pub first: usize,
+    /// The number of columns.
+    pub width: usize,
+}
+
 /// The structure of L, by columns, without its diagonal of ones.
 pub struct Symbolic {
     /// Where each column begins in the entries, and where the last one ends.
     starts: Vec<u32>,
     /// The rows of the entries, ascending in every column.
     rows: Vec<u32>,
-    /// Entries below the diagonal that a step changes: for its column, and every pair of its rows
-    /// b < a, in the order of b, then of a, the place of (a, b) in the entries.
+    panels: Vec<Panel>,
+    /// Entries that each panel changes: for every pair of rows b < a below it, in the order of b,
+    /// then of a, the place of (a, b) in the entries.
     targets: Vec<u32>,
     /// The entries of the matrix itself: places and values.
     pub own: Vec<(u32, f64)>,
@@ -24,8 +38,9 @@ impl Symbolic {
         for column in &ordering.columns {
             starts.push(starts[starts.len() - 1] + column.len() as u32);
         }
+        let panels = panels(&ordering.columns);
         let rows = ordering.columns.concat();
-        let targets = targets(&starts, &rows);
+        let targets = targets(&starts, &rows, &panels);
         let place = |row: usize, column: usize| {
             let start = starts[column] as usize;
             let found = rows[start..starts[column + 1] as usize].binary_search(&(row as u32));
@@ -36,7 +51,7 @@ impl Symbolic {
             below.map(move |&(row, value)| (place(row as usize, column), value))
         };
         let own = (0..matrix.size()).flat_map(lower).collect();
-        Symbolic { starts, rows, targets, own }
+        Symbolic { starts, rows, panels, targets, own }
     }
 
     /// Returns the number of entries below the diagonal of L.
@@ -44,32 +59,57 @@ impl Symbolic {
         self.rows.len()
     }
 
-    /// Returns for every column where it begins in the entries, and its rows.
+    /// Returns where a column begins in the entries, and its rows.
     #[inline(always)]
-    pub fn columns(&self) -> impl DoubleEndedIterator<Item = (usize, &[u32])> + ExactSizeIterator {
-        self.starts.windows(2).map(|ends| {
-            let [start, end] = [ends[0] as usize, ends[1] as usize];
-            (start, &self.rows[start..end])
-        })
+    pub fn column(&self, column: usize) -> (usize, &[u32]) {
+        let [start, end] = [self.starts[column] as usize, self.starts[column + 1] as usize];
+        (start, &self.rows[start..end])
     }
 
-    /// Returns the entries that the steps change, one step after the other.
+    /// Returns the number of entries of the longest column.
+    pub fn longest_column(&self) -> usize {
+        self.starts.windows(2).map(|ends| (ends[1] - ends[0]) as usize).max().unwrap_or(0)
+    }
+
+    /// Returns the panels, in the order of elimination.
+    #[inline(always)]
+    pub fn panels(&self) -> &[Panel] {
+        &self.panels
+    }
+
+    /// Returns the entries that the panels change, one panel after the other.
     #[inline(always)]
     pub fn targets(&self) -> &[u32] {
         &self.targets
     }
 }
 
+/// Cuts the columns into panels. The rows below a column that has an entry in the next one are all
+/// in the next one, so it is enough to compare their numbers.
+fn panels(columns: &[Vec<u32>]) -> Vec<Panel> {
+    let mut panels: Vec<Panel> = Vec::with_capacity(columns.len());
+    for (column, rows) in columns.iter().enumerate() {
+        let continues = column > 0 && {
+            let before = &columns[column - 1];
+            before.first() == Some(&(column as u32)) && before.len() == rows.len() + 1
+        };
+        match panels.last_mut() {
+            Some(panel) if continues && panel.width < WIDEST_PANEL => panel.width += 1,
+            _ => panels.push(Panel { first: column, width: 1 }),
+        }
+    }
+    panels
+}
+
 /// Returns [`Symbolic::targets`]. Entry (a, b) is looked up when column b is spread out.
-fn targets(starts: &[u32], rows: &[u32]) -> Vec<u32> {
+fn targets(starts: &[u32], rows: &[u32], panels: &[Panel]) -> Vec<u32> {
     let n = starts.len() - 1;
-    let mut from = Vec::with_capacity(n);
     let mut count = 0;
     // The entries of L in row b: where the pairs of b begin in the targets, and the rows a there.
     let mut of_row: Vec<Vec<(usize, usize, usize)>> = vec![Vec::new(); n];
-    for column in 0..n {
-        let [start, end] = [starts[column] as usize, starts[column + 1] as usize];
-        from.push(count);
+    for panel in panels {
+        let last = panel.first + panel.width - 1;
+        let [start, end] = [starts[last] as usize, starts[last + 1] as usize];
         for entry in start..end {
             of_row[rows[entry] as usize].push((count, entry + 1, end));
             count += end - entry - 1;
