@@ -284,9 +284,7 @@ impl<T: Real> Factor<T> {
     #[inline(always)]
     fn backward<const W: usize>(&self, symbolic: &Symbolic, first: usize, vectors: &mut [Lanes<T>]) {
         let mut sums = [[T::default(); LANES]; W];
-        for c in 0..W {
-            sums[c] = vectors[first + c];
-        }
+        sums.copy_from_slice(&vectors[first..first + W]);
         let (_, rows) = symbolic.column(first + W - 1);
         let entries = below_panel::<T, W>(&self.lower, symbolic, first);
         for (i, row) in rows.iter().enumerate() {

@@ -173,7 +173,7 @@ impl Trend {
     fn taken_from(&self, node: &Node) -> f64 {
         let exponent = f64::from(node.inertia.exponent) - self.mean - self.slope * (node.shift - self.middle);
         let size = node.inertia.mantissa * power_of_two(exponent);
-        if node.inertia.below % 2 == 0 { size } else { -size }
+        if node.inertia.below.is_multiple_of(2) { size } else { -size }
     }
 }
 

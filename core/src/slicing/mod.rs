@@ -2,13 +2,13 @@
 //!
 //! The Laplacian of a patch is that of a planar graph, so its factor L D Lᵀ has few entries:
 //! 3 700 for 480 vertices. A factorisation for one shift costs a thousandth of a dense
-//! tridiagonalisation, and 16 shifts are factorised at a time ([`lanes`]). The steps are:
+//! tridiagonalisation, and 16 shifts are factorised at a time (`lanes`). The steps are:
 //!
-//! 1. [`ordering`] and [`symbolic`]: once for a matrix;
-//! 2. [`isolation`]: shifts between which there is one eigenvalue each, by inertia ([`factor`]);
-//! 3. [`interpolation`]: guesses of eigenvalues from the determinants at these shifts;
-//! 4. [`iteration`]: eigenvectors;
-//! 5. [`proof`]: the result is verified, not trusted. It depends on no step before it.
+//! 1. `ordering` and `symbolic`: once for a matrix;
+//! 2. `isolation` finds shifts between which there is one eigenvalue each, by inertia (`factor`);
+//! 3. `interpolation` makes guesses of eigenvalues from the determinants at these shifts;
+//! 4. `iteration`: eigenvectors;
+//! 5. `proof`: the result is verified, not trusted. It depends on no step before it.
 //!
 //! What is not proved is left to another solver: repeated eigenvalues, above all.
 #![expect(clippy::needless_range_loop)] // one lane of several arrays at a time
