@@ -20,7 +20,7 @@ STUDY_MAPS := $(filter-out %_2km.gpkg,$(wildcard ../shared/maps/dev/*.gpkg))
 QGIS_ZIP ?= target/meshmark-qgis.zip
 FIXTURES := fixtures/helsinki.gpkg fixtures/kotka.gpkg
 
-.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz sanitizers \
+.PHONY: build test test-studies demo bench table2 coalitions false-alarms faults fuzz fuzz-build sanitizers \
 	quality conformance hosts newcomer qgis plugin-for-wheel deb install \
 	uninstall fixtures deps lint
 
@@ -29,9 +29,10 @@ build: deps
 	mkdir -p $(PLUGINS)
 	install -m 755 $(BUILD)/libmeshmark_plugin.so $(PLUGIN)
 
-# They compile neither plots nor benchmarks.
+# They compile neither plots nor benchmarks. openssl is the time-stamping authority.
 test: build
-	$(WITH_GDAL) $(CARGO) test --release --locked
+	@./install-deps.sh openssl
+	RUST_TEST_THREADS=$$(($$(nproc) * 2)) $(WITH_GDAL) $(CARGO) test --release --locked
 
 # What the studies make of their own figures.
 test-studies: build
@@ -84,6 +85,9 @@ faults: build
 # Every fuzz target for so long, side by side: make fuzz SECONDS=600 TARGETS="key record".
 fuzz: deps
 	$(WITH_GDAL) CARGO=$(CARGO) fuzz/run.sh $(or $(SECONDS),60) $(TARGETS)
+
+fuzz-build: deps
+	$(WITH_GDAL) CARGO=$(CARGO) fuzz/build.sh $(TARGETS)
 
 # The driver under AddressSanitizer, UndefinedBehaviorSanitizer and valgrind.
 sanitizers: build
@@ -147,7 +151,7 @@ lint: deps
 	$(CARGO) fmt --all -- --check
 	$(CARGO) fmt --manifest-path fuzz/Cargo.toml -- --check
 	$(WITH_GDAL) $(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
-	$(WITH_GDAL) $(CARGO) test --release --locked -p meshmark-host-tests --test architecture
+	$(WITH_GDAL) $(CARGO) test --release --locked --test architecture
 
 deps:
 	@./install-deps.sh

@@ -1,21 +1,18 @@
 #!/usr/bin/env bash
 # Builds the fuzz targets and runs them side by side: run.sh SECONDS [TARGET...]. SEED= makes the
-# same inputs again. Fails with the
-# name of a target and the input that it fails on. Inputs that reach new code go to
-# target/fuzz/corpus; the corpora beside this script are only read.
+# same inputs again. Fails with the name of a target and the input that it fails on. Inputs that reach
+# new code go to target/fuzz/corpus; the corpora beside this script are only read.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 seconds=$1
 targets=("${@:2}")
 [ ${#targets[@]} -gt 0 ] || targets=($(cd fuzz/corpus && ls))
-cargo=${CARGO:-cargo}
 host=$(rustc -vV | sed -n 's/^host: //p')
 work=target/fuzz
 built=$work/build/$host/release
 
-RUSTC_WRAPPER=$PWD/fuzz/rustc.sh "$cargo" build --release --locked --manifest-path fuzz/Cargo.toml \
-    --target "$host" --target-dir "$work/build" "${targets[@]/#/--bin=}"
+fuzz/build.sh "${targets[@]}"
 
 memory=/dev/shm
 [ -w "$memory" ] || memory=${TMPDIR:-/tmp}

@@ -8,10 +8,15 @@ use crate::{
     estimation::Estimates,
     signs::{Sequence, Signs, decoy_sums, is_pilot, signed},
 };
+use rayon::prelude::*;
 
 /// Rounds in which the shares of several recipients are fitted together. Their signs are nearly
 /// orthogonal, so each round leaves a small part of the error of the one before.
 const ROUNDS: usize = 4;
+/// The same for amplitudes that are not negative.
+const ROUNDS_OF_AMPLITUDES: usize = 8;
+/// Numbers that the patterns of all suspected candidates have together, at most.
+const MOST_NUMBERS: usize = 1 << 25;
 
 /// How far secret signs agree with the estimates of a suspect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,16 +49,16 @@ pub struct Evidence {
 impl Evidence {
     /// Selects the estimates of signs that belong to a recipient.
     pub fn of_recipients(estimates: &Estimates) -> Self {
-        Self::of(estimates, |i| !is_pilot(i))
+        Self::selected(estimates, |i| !is_pilot(i))
     }
 
     /// Selects the estimates of pilots, whose signs belong to the key, whoever the recipient is.
     pub fn of_pilots(estimates: &Estimates) -> Self {
-        Self::of(estimates, is_pilot)
+        Self::selected(estimates, is_pilot)
     }
 
     /// Selects coefficients by their number in patch and axis, counted from 1.
-    fn of(estimates: &Estimates, is_in_question: impl Fn(usize) -> bool) -> Self {
+    fn selected(estimates: &Estimates, is_in_question: impl Fn(usize) -> bool) -> Self {
         let Estimates { values, variances, coefficients } = estimates;
         let keep = |(i, value): (usize, f64)| if is_in_question(i % coefficients + 1) { value } else { 0.0 };
         Evidence {
@@ -144,6 +149,34 @@ impl Evidence {
         rest
     }
 
+    /// Returns the scores of all candidates beside the others: of the estimates, Σ_j β_j (1 − v) s_j is
+    /// taken out, where j are the *other* candidates that are suspected and the β_j ≥ 0 leave the
+    /// least squares. A candidate is suspected whose score in all estimates is `least_score` or more.
+    /// What remains for a candidate depends on the suspect and on the signs of others alone, so that
+    /// signs that have nothing to do with the suspect are independent of it.
+    pub fn scores_beside_others(&self, candidates: &[Sequence], least_score: f64) -> Vec<f64> {
+        let alone: Vec<f64> = candidates.par_iter().map(|signs| self.agreement(signs).score).collect();
+        let suspected: Vec<usize> = (0..alone.len()).filter(|&k| alone[k] >= least_score).collect();
+        if suspected.len() * self.values.len() > MOST_NUMBERS {
+            return alone;
+        }
+        let patterns: Vec<Vec<f64>> = suspected.par_iter().map(|&k| self.pattern(&candidates[k])).collect();
+        let fit = Fit::new(&patterns, &self.values);
+        let beside = |own: Option<usize>| {
+            let mut rest = self.clone();
+            for (amplitude, pattern) in fit.amplitudes(own).iter().zip(&patterns) {
+                rest.values.iter_mut().zip(pattern).for_each(|(value, p)| *value -= amplitude * p);
+            }
+            rest
+        };
+        let beside_all = beside(None);
+        let score = |(k, signs): (usize, &Sequence)| match suspected.binary_search(&k) {
+            Ok(own) => beside(Some(own)).agreement(signs).score,
+            Err(_) => beside_all.agreement(signs).score,
+        };
+        candidates.par_iter().enumerate().map(score).collect()
+    }
+
     /// Returns the expected estimates of a copy with these signs.
     fn pattern(&self, signs: &Sequence) -> Vec<f64> {
         let axes = (0..self.patches()).flat_map(|patch| [(patch, 0), (patch, 1)]);
@@ -157,6 +190,35 @@ impl Evidence {
 
     fn axis<'a>(&self, of_all: &'a [f64], patch: usize, axis: usize) -> &'a [f64] {
         &of_all[(2 * patch + axis) * self.coefficients..][..self.coefficients]
+    }
+}
+
+/// The least squares of amplitudes that are not negative.
+struct Fit {
+    /// The products of patterns with each other and with the estimates.
+    gram: Vec<Vec<f64>>,
+    with_values: Vec<f64>,
+}
+
+impl Fit {
+    fn new(patterns: &[Vec<f64>], values: &[f64]) -> Self {
+        let products = |a: &Vec<f64>| patterns.iter().map(|b| dot(a, b)).collect();
+        Fit {
+            gram: patterns.par_iter().map(products).collect(),
+            with_values: patterns.iter().map(|pattern| dot(pattern, values)).collect(),
+        }
+    }
+
+    /// Returns the amplitudes of all patterns; that of pattern `without` is 0.
+    fn amplitudes(&self, without: Option<usize>) -> Vec<f64> {
+        let mut amplitudes = vec![0.0; self.gram.len()];
+        for _ in 0..ROUNDS_OF_AMPLITUDES {
+            for (j, row) in self.gram.iter().enumerate().filter(|(j, _)| Some(*j) != without) {
+                let rest = self.with_values[j] - dot(row, &amplitudes);
+                amplitudes[j] = (amplitudes[j] + ratio(rest, row[j])).max(0.0);
+            }
+        }
+        amplitudes
     }
 }
 
@@ -293,5 +355,21 @@ mod tests {
         let nobody = rest.without(&[sequence(2), sequence(3)]);
         let [left, all] = [nobody.energy(), evidence.energy()];
         assert!(left < 1e-3 * all, "{left} {all}");
+    }
+
+    #[test]
+    fn beside_each_other_the_members_of_a_large_coalition_stand_out_and_others_do_not() {
+        const MEMBERS: u32 = 30;
+        let evidence = Evidence::of_recipients(&mean_of(&(0..MEMBERS).collect::<Vec<_>>()));
+        let candidates: Vec<Sequence> = (0..1000).map(sequence).collect();
+        let scores = evidence.scores_beside_others(&candidates, 3.0);
+        let alone: Vec<f64> = candidates.iter().map(|signs| evidence.agreement(signs).score).collect();
+        let (members, others) = scores.split_at(MEMBERS as usize);
+        assert!(members.iter().zip(&alone).all(|(beside, alone)| *beside > 2.0 * alone), "{members:?}");
+        let variance = others.iter().map(|s| s * s).sum::<f64>() / others.len() as f64;
+        let most = others.iter().copied().fold(f64::MIN, f64::max);
+        assert!((variance - 1.0).abs() < 0.2 && most < 5.0, "{variance} {most}");
+        // A candidate alone has nobody beside.
+        assert_eq!(evidence.scores_beside_others(&candidates[..1], 0.0), alone[..1]);
     }
 }

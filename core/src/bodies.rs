@@ -62,6 +62,17 @@ impl Bodies {
         Bodies { bodies, number }
     }
 
+    /// Returns the bodies that are kept, and the others.
+    pub(crate) fn divide(self, is_kept: impl Fn(&Body) -> bool) -> (Self, Vec<Body>) {
+        let Bodies { bodies, mut number } = self;
+        let (kept, others): (Vec<Body>, Vec<Body>) = bodies.into_iter().partition(is_kept);
+        others.iter().flat_map(|body| &body.members).for_each(|&v| number[v as usize] = FREE);
+        for (new, body) in kept.iter().enumerate() {
+            body.members.iter().for_each(|&v| number[v as usize] = new as u32);
+        }
+        (Bodies { bodies: kept, number }, others)
+    }
+
     /// Returns all bodies; the position of a body is its number.
     pub fn as_slice(&self) -> &[Body] {
         &self.bodies
@@ -81,7 +92,7 @@ fn sizes(first: &[u32]) -> Vec<u32> {
 }
 
 impl Body {
-    fn new(map: &Map, members: Vec<u32>) -> Self {
+    pub(crate) fn new(map: &Map, members: Vec<u32>) -> Self {
         let origin = map.at(members[0]);
         let scale = map.ground.metres_per_unit(origin);
         let at: Vec<[f64; 2]> = members

@@ -27,7 +27,7 @@ use rayon::prelude::*;
 pub type Observed = [Option<[f64; 2]>];
 
 /// Lower bound of the estimated noise, metres.
-pub(crate) const LEAST_NOISE_M: f64 = 0.01;
+pub const LEAST_NOISE_M: f64 = 0.01;
 /// Numbers of patches, and of vertices in each, from which the hyper-parameters are estimated.
 const SAMPLE_PATCHES: usize = 6;
 const SAMPLE_VERTICES: usize = 200;

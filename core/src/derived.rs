@@ -138,7 +138,7 @@ impl<'a> Observables<'a> {
 fn in_patch(patches: &Patches, rows: &[PatchRow], shares: &Shares) -> (usize, Derived) {
     let energy = |matrix: &[[f64; 2]; 2]| matrix.as_flattened().iter().map(|s| s * s).sum::<f64>() / 2.0;
     let determined = shares.iter().filter_map(|(vertex, matrix)| {
-        let PatchRow { patch, row } = rows[*vertex as usize];
+        let PatchRow { patch, row } = Some(rows[*vertex as usize]).filter(|row| *row != PatchRow::NONE)?;
         let hangs = patches.as_slice()[patch as usize].hangs_elsewhere(row as usize);
         (!hangs).then_some((patch, row, matrix))
     });

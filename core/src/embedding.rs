@@ -38,6 +38,20 @@ pub struct Marked {
     pub attenuated: usize,
 }
 
+impl Marked {
+    /// Describes a map that was marked, given its number of patches and of hanging vertices.
+    pub(crate) fn new(map: &Map, settled: Settled, (patches, junctions): (usize, usize)) -> Self {
+        Marked {
+            displacement: Displacement::between(map.vertices, &settled.coords, map.measure),
+            angles: AngleChange::at(&Corner::all(map, &settled.coords)),
+            coords: settled.coords,
+            patches,
+            junctions,
+            attenuated: settled.attenuated,
+        }
+    }
+}
+
 /// A mark is read back from this many patches, which are solved again; from all patches only if
 /// that fails.
 const READ_BACK_PATCHES: usize = 16;
@@ -75,7 +89,7 @@ impl<'a> Embedding<'a> {
         bits: usize,
         parameters: &'a Parameters,
     ) -> Result<Embedding<'a>> {
-        let groundwork = Groundwork::new(map, parameters, |patches| patches.carriers(bits, parameters))?;
+        let groundwork = Groundwork::new(*map, parameters, |patches| patches.carriers(bits, parameters))?;
         Ok(Embedding { groundwork, carrier: Carrier::new(key) })
     }
 
@@ -120,7 +134,8 @@ impl<'a> Embedding<'a> {
     pub fn settle(&self, message: &Message, wanted: &[[f64; 2]]) -> Result<Marked> {
         let settled = self.groundwork.settle(wanted);
         self.check_message(message, &settled)?;
-        Ok(self.groundwork.marked(settled))
+        let hanging = self.groundwork.patches.constraints().junctions.hanging().len();
+        Ok(Marked::new(&self.groundwork.map, settled, (self.patches(), hanging)))
     }
 
     /// Reads the message back as the verifier does by default, from as many patches as it takes: by
@@ -129,7 +144,8 @@ impl<'a> Embedding<'a> {
     /// of the noise that the digits of a format add.
     fn check_message(&self, message: &Message, settled: &Settled) -> Result<()> {
         let Groundwork { bases, parameters, .. } = &self.groundwork;
-        let (observed, disturbance) = self.groundwork.seen(settled);
+        let places = |vertex: usize| Some(settled.coords[vertex]);
+        let (observed, disturbance) = self.groundwork.seen(places, settled.deviation_m);
         let read = |patches: Patches| {
             let (from, bits) = ((&patches, &bases[..]), message.len());
             joint_solved(from, &self.carrier, &observed, bits, parameters, &disturbance)
@@ -146,7 +162,7 @@ impl<'a> Embedding<'a> {
 
 /// The part of a marking that does not depend on what the mark carries.
 pub(crate) struct Groundwork<'a> {
-    map: &'a Map<'a>,
+    pub map: Map<'a>,
     placement: Placement<'a>,
     tree: VertexTree<'a>,
     pub patches: Patches,
@@ -161,13 +177,13 @@ impl<'a> Groundwork<'a> {
     /// Meshes the map and cuts it into patches, of which `coefficients` returns how many
     /// coefficients carry the mark.
     pub fn new(
-        map: &'a Map<'a>,
+        map: Map<'a>,
         parameters: &'a Parameters,
         coefficients: impl FnOnce(&Patches) -> Result<usize>,
     ) -> Result<Self> {
-        let placement = Placement::new(map, parameters)?;
-        let tree = VertexTree::of_all(map);
-        let patches = Patches::with_tree(map, &tree, parameters)?;
+        let placement = Placement::new(&map, parameters)?;
+        let tree = VertexTree::of_all(&map);
+        let patches = Patches::with_tree(&map, &tree, parameters)?;
         let coefficients = coefficients(&patches)?;
         Ok(Groundwork { map, placement, tree, patches, bases: Vec::new(), coefficients, parameters })
     }
@@ -242,31 +258,22 @@ impl<'a> Groundwork<'a> {
     /// Returns the places of the vertices that are displaced as wanted, as far as the constraints
     /// allow.
     pub fn settle(&self, wanted: &[[f64; 2]]) -> Settled {
-        settle(self.map, &self.tree, self.patches.constraints(), wanted, &self.placement)
+        settle(&self.map, &self.tree, (self.patches.constraints(), &[]), wanted, &self.placement)
     }
 
-    /// Returns the marked map.
-    pub fn marked(&self, settled: Settled) -> Marked {
-        let Groundwork { map, patches, .. } = self;
-        Marked {
-            displacement: Displacement::between(map.vertices, &settled.coords, map.measure),
-            angles: AngleChange::at(&Corner::all(map, &settled.coords)),
-            coords: settled.coords,
-            patches: patches.as_slice().len(),
-            junctions: patches.constraints().junctions.hanging().len(),
-            attenuated: settled.attenuated,
-        }
-    }
-
-    /// Returns the displacements of the vertices, metres, and their noise, which is that of the
-    /// grid and of the constraints.
-    pub fn seen(&self, settled: &Settled) -> (Vec<Option<[f64; 2]>>, Prediction) {
-        let from = self.map.vertices.coords().iter();
-        let moved = |(from, to): (&[f64; 2], &[f64; 2])| Some(self.map.ground.metres_between(*from, *to));
-        let observed: Vec<Option<[f64; 2]>> = from.zip(&settled.coords).map(moved).collect();
+    /// Returns the displacements of the vertices to their places, metres, and their noise, which is
+    /// that of the grid and of the constraints. A vertex without a place was not found.
+    pub fn seen(
+        &self,
+        places: impl Fn(usize) -> Option<[f64; 2]>,
+        deviation_m: f64,
+    ) -> (Vec<Option<[f64; 2]>>, Prediction) {
+        let from = self.map.vertices.coords().iter().enumerate();
+        let moved = |(v, from): (usize, &[f64; 2])| Some(self.map.ground.metres_between(*from, places(v)?));
+        let observed: Vec<Option<[f64; 2]>> = from.map(moved).collect();
         let [_, metres_per_unit] = self.map.ground.metres_per_unit(self.map.vertices.centre());
         let rounding_m = self.parameters.precision_crs_units.unwrap_or(0.0) * metres_per_unit / 12f64.sqrt();
-        let noise_m = rounding_m.hypot(settled.deviation_m).max(LEAST_NOISE_M);
+        let noise_m = rounding_m.hypot(deviation_m).max(LEAST_NOISE_M);
         let disturbance = Prediction::of_noise(noise_m, observed.len());
         (observed, disturbance)
     }

@@ -30,6 +30,7 @@ pub enum Error {
     Quotes { option: &'static str, value: String },
     IllegalValue { option: &'static str, value: String, kind: Kind },
     BothSubjects,
+    BaseOfMessage,
     NoReference,
 }
 
@@ -57,6 +58,7 @@ impl std::error::Error for Error {
 #[allow(missing_docs)] // the messages are the documentation
 pub enum KeyFault {
     Json,
+    Protected,
     Version { found: u32, expected: u32 },
     Secret,
     Id,
@@ -68,6 +70,9 @@ impl fmt::Display for KeyFault {
             KeyFault::Json => {
                 f.write_str("it is not JSON with exactly the fields meshmark_key, id and secret")
             }
+            KeyFault::Protected => f.write_str(
+                "a passphrase protects it, which cannot be given here: open it in a pipe, in bash KEY=<(age -d key.json)",
+            ),
             KeyFault::Version { found, expected } => write!(f, "version {found} instead of {expected}"),
             KeyFault::Secret => f.write_str("the secret is not 64 hexadecimal digits"),
             KeyFault::Id => f.write_str("the id is not that of the secret, so one of them was changed"),
@@ -87,6 +92,8 @@ pub enum RecordFault {
     Coefficients { found: usize, most: usize },
     Digest { text: String },
     NoPart,
+    UnknownBase { digest: String },
+    OwnBase,
     NoRecipient,
 }
 
@@ -107,6 +114,10 @@ impl fmt::Display for RecordFault {
             RecordFault::Digest { text } => {
                 write!(f, "\"{text}\" is no digest: it has 64 hexadecimal digits")
             }
+            RecordFault::UnknownBase { digest } => {
+                write!(f, "a base has the base {digest}, which is not listed before it")
+            }
+            RecordFault::OwnBase => f.write_str("it names its own edition as a base"),
             RecordFault::NoPart => f.write_str("it names no part of the map"),
             RecordFault::NoRecipient => f.write_str("it has no recipient"),
         }
@@ -211,6 +222,13 @@ impl Error {
             Error::NoReference => format!(
                 "there is no {}: name a GeoPackage for the unmarked map, which nobody else will have",
                 name("REFERENCE")
+            ),
+            Error::BaseOfMessage => format!(
+                "{} is for fingerprints: give a {}, and neither {} nor {}",
+                name("BASE"),
+                name("RECIPIENT"),
+                name("CODE"),
+                name("CHIP_RATE")
             ),
             Error::BothSubjects => {
                 format!("both {} and {} are given: give exactly one", name("RECIPIENT"), name("MESSAGE"))

@@ -40,8 +40,12 @@ pub struct FingerprintRecord {
     pub reference: ReferenceEntry,
     /// The copy that was handed out.
     pub copy: CopyEntry,
-    /// The parts of the map, each with signs of its own.
+    /// The parts of the map and its bases, each with signs of its own.
     pub parts: Vec<PartEntry>,
+    /// The earlier editions from which vertices stand, the oldest first, those of the bases among
+    /// them; omitted when there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bases: Vec<BaseEntry>,
     /// What marking did to the map, by the names of version 1.
     #[serde(flatten)]
     pub distortion: Distortion,
@@ -87,6 +91,20 @@ pub struct ReferenceEntry {
 pub struct CopyEntry {
     /// Digest of its file; null where another program writes it.
     pub file_sha256: Option<String>,
+}
+
+/// An earlier edition, as the record of a later one describes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BaseEntry {
+    /// Digest of the vertices of its reference.
+    pub vertices_sha256: String,
+    /// Layers that were marked; all when null.
+    pub layers: Option<Vec<String>>,
+    /// CRS given for a source that had none.
+    pub srs: Option<String>,
+    /// Digests of the vertices of its own bases, in the order of its record.
+    pub bases: Vec<String>,
 }
 
 /// A part of the map, as a record describes it.
@@ -169,7 +187,21 @@ impl FingerprintRecord {
             refuses_traces: false,
             srs: self.srs.clone(),
             record_path: None,
+            bases: None,
+            base_references: None,
         }
+    }
+
+    /// Returns the editions that a later one rests on if this is its base, this one last.
+    pub fn chain(&self) -> Vec<BaseEntry> {
+        let digest = |base: &BaseEntry| base.vertices_sha256.clone();
+        let own = BaseEntry {
+            vertices_sha256: self.reference.vertices_sha256.clone(),
+            layers: self.layers.clone(),
+            srs: self.srs.clone(),
+            bases: self.bases.iter().map(digest).collect(),
+        };
+        self.bases.iter().cloned().chain([own]).collect()
     }
 
     fn check(&self) -> Result<()> {
@@ -183,8 +215,24 @@ impl FingerprintRecord {
         }
         let digests = [Some(&self.key_commitment), Some(&self.reference.vertices_sha256)];
         let of_files = [self.reference.file_sha256.as_ref(), self.copy.file_sha256.as_ref()];
-        if let Some(bad) = digests.into_iter().chain(of_files).flatten().find(|text| !is_digest(text)) {
+        let of_bases = self.bases.iter().flat_map(|base| base.bases.iter().chain([&base.vertices_sha256]));
+        let digests = digests.into_iter().chain(of_files).flatten().chain(of_bases);
+        if let Some(bad) = digests.into_iter().find(|text| !is_digest(text)) {
             return fault(RecordFault::Digest { text: bad.clone() });
+        }
+        // The bases of a base come before it.
+        let named = |digest: &String, number: usize| {
+            self.bases[..number].iter().any(|base| base.vertices_sha256 == *digest)
+        };
+        let late = |(number, base): (usize, &BaseEntry)| {
+            base.bases.iter().find(|digest| !named(digest, number)).cloned()
+        };
+        let is_own = |base: &&BaseEntry| base.vertices_sha256 == self.reference.vertices_sha256;
+        if self.bases.iter().any(|base| is_own(&base)) {
+            return fault(RecordFault::OwnBase);
+        }
+        if let Some(digest) = self.bases.iter().enumerate().find_map(late) {
+            return fault(RecordFault::UnknownBase { digest });
         }
         if self.parts.is_empty() {
             return fault(RecordFault::NoPart);
@@ -236,7 +284,8 @@ mod tests {
                 crs: Some("EPSG:3067".into()),
             },
             copy: CopyEntry { file_sha256: Some("0f".repeat(32)) },
-            parts: vec![PartEntry { sha256: PartDigest::of(&vertices), vertices: 1, patches: 1 }],
+            parts: vec![PartEntry { sha256: PartDigest::new(&vertices), vertices: 1, patches: 1 }],
+            bases: Vec::new(),
             distortion: Distortion {
                 displacement: Displacement { rms_m: 0.1, p99_m: 0.2, max_m: 0.3 },
                 angles: AngleChange::at(&[]),
@@ -285,6 +334,22 @@ mod tests {
         }
     }
 
+    fn base(byte: &str, bases: &[&str]) -> Value {
+        let bases: Vec<String> = bases.iter().map(|byte| byte.repeat(32)).collect();
+        json!({ "vertices_sha256": byte.repeat(32), "layers": null, "srs": null, "bases": bases })
+    }
+
+    #[test]
+    fn a_chain_ends_with_the_edition_and_names_its_bases() {
+        let text = changed("/bases", json!([base("ab", &[]), base("cd", &["ab"])]));
+        let record = FingerprintRecord::from_json(&text).unwrap();
+        let chain = record.chain();
+        assert_eq!(chain[..2], record.bases);
+        assert_eq!(chain[2].vertices_sha256, record.reference.vertices_sha256);
+        assert_eq!(chain[2].bases, ["ab", "cd"].map(|byte| byte.repeat(32)));
+        assert!(!self::record().to_json().contains("bases"), "records of one edition are as before");
+    }
+
     #[test]
     fn a_value_that_no_marking_writes_is_refused_by_its_name() {
         for (pointer, value, words) in [
@@ -298,6 +363,8 @@ mod tests {
             ("/copy/file_sha256", json!("?"), "\"?\" is no digest"),
             ("/parts", json!([]), "no part"),
             ("/parts/0/sha256", json!("00"), "64 hexadecimal digits"),
+            ("/bases", json!([base("ab", &[]), base("?", &[])]), "is no digest"),
+            ("/bases", json!([base("cd", &["ab"]), base("ab", &[])]), "not listed before it"),
             ("/recipient", json!(" "), "no recipient"),
             ("/recipient", json!(null), "invalid type: null"),
         ] {

@@ -11,7 +11,7 @@ pub fn encode(bytes: &[u8]) -> String {
 
 /// Decodes `text`, in either case, into `bytes` and makes no other copy; returns `None` unless the
 /// text is exactly the digits of that many bytes.
-pub(crate) fn decode_into(text: &str, bytes: &mut [u8]) -> Option<()> {
+pub fn decode_into(text: &str, bytes: &mut [u8]) -> Option<()> {
     if text.len() != 2 * bytes.len() {
         return None;
     }

@@ -35,6 +35,11 @@ pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     }
 }
 
+/// Returns whether a passphrase protects a text, which then is in the format of `age`, armoured.
+pub fn is_protected(text: &str) -> bool {
+    text.trim_start().starts_with("-----BEGIN AGE ENCRYPTED FILE-----")
+}
+
 /// The versions of the mark, whose secrets are independent of each other.
 #[derive(Clone, Copy)]
 enum MarkVersion {
@@ -87,6 +92,9 @@ impl SecretKey {
     /// [`Error::Key`] when it is not a key file of this version or its id is not that of its
     /// secret. The message never holds the secret.
     pub fn from_json(text: &str) -> Result<Self> {
+        if is_protected(text) {
+            return Err(Error::Key(KeyFault::Protected));
+        }
         // The messages of serde may quote values of the file, so they are not shown.
         let file: KeyFile = serde_json::from_str(text).map_err(|_| Error::Key(KeyFault::Json))?;
         if file.meshmark_key != VERSION {
@@ -143,6 +151,12 @@ impl SecretKey {
     /// another key with the same ones.
     pub fn commitment(&self) -> String {
         hex::encode(&self.derive_for(MarkVersion::Two, "key commitment", b""))
+    }
+
+    /// Returns 256 bits of a keyed hash of a recipient, in hexadecimal: whoever has the key finds the
+    /// recipient in a list of them, and nobody else learns a name from it.
+    pub fn blinded(&self, recipient: &str) -> String {
+        hex::encode(&self.derive_for(MarkVersion::Two, "blinded recipient", recipient.as_bytes()))
     }
 
     /// Returns the seed of the signs that all copies of a part have in common.
@@ -230,6 +244,14 @@ mod tests {
     }
 
     #[test]
+    fn a_protected_key_is_refused_with_the_way_to_open_it() {
+        let text = "-----BEGIN AGE ENCRYPTED FILE-----\nYWdl\n-----END AGE ENCRYPTED FILE-----\n";
+        let error = SecretKey::from_json(text).unwrap_err().to_string();
+        assert!(error.contains("age -d key.json"), "{error}");
+        assert!(is_protected(text) && !is_protected(&SecretKey::from_bytes([1; 32]).to_json()));
+    }
+
+    #[test]
     fn a_text_is_read_to_its_end_or_refused() {
         let text = "ä".repeat(1 << 19);
         assert_eq!(*read_text(text.as_bytes()).unwrap(), text);
@@ -254,5 +276,14 @@ mod tests {
         assert_eq!(a.commitment().len(), 64);
         assert_ne!(a.commitment(), b.commitment());
         assert!(!a.commitment().starts_with(&a.id()));
+    }
+
+    #[test]
+    fn a_blinded_recipient_depends_on_key_and_name_and_on_no_other_use_of_them() {
+        let [a, b] = [1, 2].map(|byte| SecretKey::from_bytes([byte; 32]));
+        assert_eq!(a.blinded("ACME"), a.blinded("ACME"));
+        assert_ne!(a.blinded("ACME"), a.blinded("ACME "));
+        assert_ne!(a.blinded("ACME"), b.blinded("ACME"));
+        assert_ne!(a.blinded(""), a.commitment());
     }
 }

@@ -75,6 +75,7 @@ pub mod record;
 pub mod recorded;
 mod response;
 pub mod scale;
+pub mod series;
 mod sides;
 pub mod signs;
 mod slicing;

@@ -120,6 +120,38 @@ impl MapData {
         Ok(MapData { vertices, segments, polygon_roots: joined.roots(), areas, labels, polylines })
     }
 
+    /// Returns the map with the vertices of earlier editions besides its own, and with the segments
+    /// and polygon groups of those that it lacks.
+    ///
+    /// # Errors
+    /// [`Error::TooWide`].
+    pub fn with_earlier(&self, earlier: &[&MapData]) -> Result<Self> {
+        let all = std::iter::once(self).chain(earlier.iter().copied());
+        let coords = all.clone().flat_map(|map| map.vertices.coords().iter().copied()).collect();
+        let (vertices, indices) = VertexTable::indexed(coords)?;
+        let own = &indices[..self.vertices.len()];
+        let mut is_own = vec![false; vertices.len()];
+        own.iter().for_each(|&v| is_own[v as usize] = true);
+        let (mut segments, mut joined) = (Vec::new(), DisjointSets::new(vertices.len()));
+        let mut first = 0;
+        for (number, map) in all.enumerate() {
+            let on_all = &indices[first..first + map.vertices.len()];
+            first += on_all.len();
+            let counts = |v: u32| number == 0 || !is_own[v as usize];
+            let placed = map.segments.iter().map(|segment| segment.map(|v| on_all[v as usize]));
+            segments.extend(placed.filter(|&[a, b]| counts(a) || counts(b)));
+            // A group of which the map has vertices may be another one there.
+            let mut firsts = vec![None; on_all.len()];
+            for (&v, &root) in on_all.iter().zip(&map.polygon_roots).filter(|(v, _)| counts(**v)) {
+                joined.join(v, *firsts[root as usize].get_or_insert(v));
+            }
+        }
+        let areas = self.areas.clone().on(own);
+        let (labels, polylines) = (self.labels.clone(), self.polylines.clone());
+        let segments = distinct(segments.into_iter());
+        Ok(MapData { vertices, segments, polygon_roots: joined.roots(), areas, labels, polylines })
+    }
+
     /// Returns the map as input of the algorithm; `ground` has the metres of the mark, `measure`
     /// those of limits and figures.
     pub fn on<'a>(&'a self, ground: &'a Ground, measure: &'a Ground) -> Map<'a> {
@@ -192,6 +224,23 @@ mod tests {
             polygon_roots(&indices, &[0, 4, 8, 12, 14], kinds, 12),
             [0, 0, 0, 0, 0, 0, 0, 0, 8, 9, 9, 9]
         );
+    }
+
+    #[test]
+    fn earlier_editions_add_the_vertices_that_are_gone_and_their_lines() {
+        let ring = |corners: [[f64; 2]; 3]| {
+            let [a, b, c] = corners;
+            MapData::from_chains(vec![a, b, c, a], &[0], [ChainKind::Shell]).unwrap().0
+        };
+        let newest = ring([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]);
+        let earlier = ring([[0.0, 0.0], [1.0, 0.0], [2.0, 2.0]]);
+        let all = newest.with_earlier(&[&earlier]).unwrap();
+        assert_eq!(all.vertices.coords(), [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0]]);
+        // That from 0 to 3 is in both, and all of the earlier edition are at the vertex that is gone.
+        assert_eq!(all.segments, [[0, 1], [0, 2], [0, 3], [1, 3], [2, 3]]);
+        assert_eq!(all.polygon_roots, [0, 1, 0, 0]);
+        let again = newest.with_earlier(&[]).unwrap();
+        assert_eq!((again.vertices, again.segments), (newest.vertices, newest.segments));
     }
 
     #[test]

@@ -128,9 +128,24 @@ impl Patches {
         if parameters.basis == Laplacian::Cotangent {
             weigh(&mut patches, mesh.triangles(), &place, &points);
         }
-        let [_, metres] = ground.metres_per_unit(table.centre());
-        let positions_m = points.iter().map(|p| p.map(|value| value * metres)).collect();
-        Ok(Patches { patches, positions_m, groups: groups(map), constraints })
+        Ok(Patches { patches, positions_m: positions_m(map, &points), groups: groups(map), constraints })
+    }
+
+    /// Puts the patches of parts of `map` one after the other; with each part come the indices of
+    /// its vertices on the map, ascending. Vertices of no part are in no patch, and the constraints
+    /// of the parts are left out.
+    pub(crate) fn in_turn(map: &Map, parts: impl Iterator<Item = (Patches, Vec<u32>)>) -> Self {
+        let on_map = |(part, indices): (Patches, Vec<u32>)| {
+            let place = move |patch: Patch| {
+                let vertices = patch.vertices.iter().map(|&v| indices[v as usize]).collect();
+                Patch { vertices, ..patch }
+            };
+            part.patches.into_iter().map(place)
+        };
+        let points = map.vertices.local(map.ground.x_scale(map.vertices.centre()[1]));
+        let positions_m = positions_m(map, &points);
+        let (patches, constraints) = (parts.flat_map(on_map).collect(), Constraints::default());
+        Patches { patches, positions_m, groups: groups(map), constraints }
     }
 
     /// Returns the patches; the position of a patch is its number.
@@ -149,7 +164,7 @@ impl Patches {
         &self.positions_m
     }
 
-    /// Returns the place of every vertex in its patch.
+    /// Returns the place of every vertex in its patch, [`PatchRow::NONE`] for one in none.
     pub(crate) fn rows(&self) -> Vec<PatchRow> {
         PatchRow::of_all(self.patches.iter().map(|patch| &patch.vertices), self.vertex_count())
     }
@@ -226,6 +241,12 @@ impl Patches {
         }
         seen.iter().position(|s| !s).map_or(Ok(()), |v| Err(format!("vertex {v} is in no patch")))
     }
+}
+
+/// Returns the positions of vertices in metres; `points` are their local coordinates.
+fn positions_m(map: &Map, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let [_, metres] = map.ground.metres_per_unit(map.vertices.centre());
+    points.iter().map(|p| p.map(|value| value * metres)).collect()
 }
 
 /// Returns the polygon group of every vertex.
@@ -310,15 +331,18 @@ fn longer_side(points: &[[f64; 2]], set: &[u32]) -> usize {
 }
 
 /// The patch of a vertex and its position in it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct PatchRow {
     pub patch: u32,
     pub row: u32,
 }
 
 impl PatchRow {
+    /// The place of a vertex that is in no patch.
+    pub const NONE: PatchRow = PatchRow { patch: u32::MAX, row: u32::MAX };
+
     fn of_all<'a>(leaves: impl Iterator<Item = &'a Vec<u32>>, vertices: usize) -> Vec<PatchRow> {
-        let mut places = vec![PatchRow { patch: 0, row: 0 }; vertices];
+        let mut places = vec![PatchRow::NONE; vertices];
         for (patch, leaf) in leaves.enumerate() {
             for (row, &v) in leaf.iter().enumerate() {
                 places[v as usize] = PatchRow { patch: patch as u32, row: row as u32 };

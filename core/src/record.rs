@@ -152,6 +152,8 @@ impl Record {
             refuses_traces: false,
             srs: self.srs.clone(),
             record_path: None,
+            bases: None,
+            base_references: None,
         };
         options.check().map_err(illegal)?;
         Ok(options)

@@ -5,6 +5,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Coefficients of a patch and axis that carry a fingerprint by default.
 pub const COEFFICIENTS: usize = 256;
@@ -29,23 +30,44 @@ impl Signs for &dyn Signs {
     }
 }
 
-/// Secret signs for all coefficients: those of a patch and axis are the bits of ChaCha20 stream
-/// 2·patch + axis, least significant bit of each 64-bit word first; a 1 is +1, a 0 is −1.
-#[derive(Clone, Copy)]
+/// Secret signs for all coefficients of the parts of a map. Every part has a seed of its own; the
+/// signs of a patch and axis are the bits of its ChaCha20 stream 2·patch + axis, with patches counted
+/// from the first one of the part, least significant bit of each 64-bit word first; a 1 is +1, a 0 is
+/// −1.
+#[derive(Clone)]
 pub struct Sequence {
+    parts: Arc<[PartSeed]>,
+}
+
+/// The seed of a part, and the number of its first patch.
+#[derive(Clone, Copy)]
+struct PartSeed {
+    first: usize,
     seed: [u8; 32],
 }
 
 impl Sequence {
-    /// Creates the sequence of a seed.
+    /// Creates the sequence of a seed, for a map of one part.
     pub(crate) fn new(seed: [u8; 32]) -> Self {
-        Sequence { seed }
+        Self::of_parts(std::iter::once((0, seed)))
+    }
+
+    /// Creates the sequence of parts, given the number of the first patch and the seed of each; the
+    /// numbers ascend from 0.
+    pub(crate) fn of_parts(parts: impl Iterator<Item = (usize, [u8; 32])>) -> Self {
+        Sequence { parts: parts.map(|(first, seed)| PartSeed { first, seed }).collect() }
+    }
+
+    /// Returns the sequence of one part alone.
+    pub(crate) fn part(&self, number: usize) -> Self {
+        Self::new(self.parts[number].seed)
     }
 
     /// Returns the signs of a patch and axis, 64 in each word.
     pub(crate) fn words(&self, patch: usize, axis: usize) -> impl Iterator<Item = u64> {
-        let mut stream = ChaCha20Rng::from_seed(self.seed);
-        stream.set_stream((2 * patch + axis) as u64);
+        let part = self.parts[self.parts.partition_point(|part| part.first <= patch) - 1];
+        let mut stream = ChaCha20Rng::from_seed(part.seed);
+        stream.set_stream((2 * (patch - part.first) + axis) as u64);
         std::iter::repeat_with(move || stream.next_u64())
     }
 }
@@ -83,6 +105,17 @@ pub(crate) fn decoy_sums(values: &[f64], count: usize, seed: [u8; 32]) -> Vec<f6
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_part_has_the_signs_that_it_has_alone() {
+        let seeds = [[1; 32], [2; 32], [3; 32]];
+        let joined = Sequence::of_parts([0, 4, 5].into_iter().zip(seeds));
+        for (patch, part, own) in [(0, 0, 0), (3, 0, 3), (4, 1, 0), (5, 2, 0), (9, 2, 4)] {
+            let alone = Sequence::new(seeds[part]).signs(own, 1, 200);
+            assert_eq!(joined.signs(patch, 1, 200), alone);
+            assert_eq!(joined.part(part).signs(own, 1, 200), alone);
+        }
+    }
 
     #[test]
     fn a_value_times_its_sign_has_the_sign_of_its_bit() {

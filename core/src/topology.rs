@@ -41,21 +41,23 @@ pub(crate) struct Settled {
 /// Moves every vertex by the displacement `wanted` (CRS units), bodies by the rigid motion nearest
 /// to it, as far as the topology of the map and the placement allow; `tree` holds all vertices. On
 /// a grid too coarse for the map, rounding alone may change the topology; such changes are not
-/// undone.
+/// undone. Vertices with a place in `standing`, which is empty where none has, go there; the
+/// constraints are those on the others, which are attenuated to the movement of the standing ones
+/// that they meet. Standing vertices alone may meet new segments among themselves.
 pub(crate) fn settle(
     map: &Map,
     tree: &VertexTree,
-    constraints: &Constraints,
+    (constraints, standing): (&Constraints, &[Option<[f64; 2]>]),
     wanted: &[[f64; 2]],
     placement: &Placement,
 ) -> Settled {
-    let mut movement = Movement::new(*map, constraints, wanted, placement);
+    let mut movement = Movement::new(*map, (constraints, standing), wanted, placement);
     let free = movement.coords.clone();
     let mut clusters = Clusters::new(wanted.len());
     let mut changed: Option<Changed> = None;
     loop {
         let hits = movement.hits(tree, changed.as_ref());
-        let touched = clusters.merge(hits.iter().map(|hit| movement.movers(hit)));
+        let touched = clusters.merge(hits.iter().map(|hit| movement.met_by(hit)));
         if touched.is_empty() {
             break;
         }
@@ -77,11 +79,20 @@ pub(crate) fn settle(
 /// A vertex and a segment that meet.
 type Hit = [u32; 3];
 
+/// What takes part in a hit.
+struct Met {
+    movers: Vec<u32>,
+    /// Vertices that stand, in ascending order.
+    standing: Vec<u32>,
+}
+
 /// The state of the movement. Its movers are free vertices, and bodies, each named by its first
 /// vertex.
 struct Movement<'a> {
     map: Map<'a>,
     constraints: &'a Constraints,
+    /// The given place of every vertex that stands, CRS units; empty where none does.
+    standing: &'a [Option<[f64; 2]>],
     placement: &'a Placement<'a>,
     slack: Slack,
     /// CRS units.
@@ -100,7 +111,7 @@ struct Changed<'a> {
 impl<'a> Movement<'a> {
     fn new(
         map: Map<'a>,
-        constraints: &'a Constraints,
+        (constraints, standing): (&'a Constraints, &'a [Option<[f64; 2]>]),
         wanted: &'a [[f64; 2]],
         placement: &'a Placement<'a>,
     ) -> Self {
@@ -113,12 +124,18 @@ impl<'a> Movement<'a> {
             JUNCTION_M,
         );
         let (displacements, coords) = (wanted.to_vec(), map.vertices.coords().to_vec());
-        let mut movement = Movement { map, constraints, placement, slack, wanted, displacements, coords };
+        let mut movement =
+            Movement { map, constraints, standing, placement, slack, wanted, displacements, coords };
         for body in constraints.bodies.as_slice() {
             movement.move_by(body.members[0], movement.wanted_of(body.members[0]));
         }
         movement.place();
         movement
+    }
+
+    /// Returns the given place of a vertex that stands.
+    fn standing_at(&self, vertex: u32) -> Option<[f64; 2]> {
+        self.standing.get(vertex as usize).copied().flatten()
     }
 
     fn body(&self, vertex: u32) -> Option<&'a Body> {
@@ -164,19 +181,46 @@ impl<'a> Movement<'a> {
     fn attenuate(&mut self, cluster: &Cluster) {
         let (of_mean, of_rest) = LEVELS[cluster.level];
         let wanted: Vec<Motion> = cluster.members.iter().map(|&mover| self.wanted_of(mover)).collect();
-        let mean = [0, 1]
-            .map(|axis| wanted.iter().map(|motion| motion.shift_m[axis]).sum::<f64>() / wanted.len() as f64);
+        let mean = mean(wanted.iter().map(|motion| motion.shift_m));
         for (&mover, motion) in cluster.members.iter().zip(wanted) {
-            let shift = |axis: usize| of_mean * mean[axis] + of_rest * (motion.shift_m[axis] - mean[axis]);
+            let rest = self.standing_near(mover, &cluster.met);
+            let shift = |axis: usize| {
+                let of_all = rest[axis] + of_mean * (mean[axis] - rest[axis]);
+                of_all + of_rest * (motion.shift_m[axis] - mean[axis])
+            };
             self.move_by(mover, Motion { shift_m: [0, 1].map(shift), turn: of_rest * motion.turn });
         }
+    }
+
+    /// Returns the movement of standing vertices at the place of a mover, metres: their mean, each
+    /// weighted by the inverse of its distance, which on a segment is that of the nearest place.
+    fn standing_near(&self, mover: u32, standing: &BTreeSet<u32>) -> [f64; 2] {
+        let own = [mover];
+        let members = self.body(mover).map_or(&own[..], |body| &body.members);
+        let weight = |v: u32| {
+            let distance = |&member: &u32| {
+                let [dx, dy] = self.map.ground.metres_between(self.map.at(member), self.map.at(v));
+                dx.hypot(dy)
+            };
+            1.0 / members.iter().map(distance).fold(f64::INFINITY, f64::min).max(JUNCTION_M)
+        };
+        let (mut sum, mut weights) = ([0.0; 2], 0.0);
+        for &v in standing {
+            let (weight, scale) = (weight(v), self.scale(v));
+            weights += weight;
+            sum = [0, 1].map(|a| sum[a] + weight * self.wanted[v as usize][a] * scale[a]);
+        }
+        if weights > 0.0 { sum.map(|value| value / weights) } else { sum }
     }
 
     /// Moves hanging vertices along with their anchors and places all vertices.
     fn place(&mut self) {
         self.constraints.junctions.follow(&mut self.displacements);
-        let place = |(from, displacement): (&[f64; 2], &[f64; 2])| self.placement.place(*from, *displacement);
-        self.coords = self.map.vertices.coords().par_iter().zip(&self.displacements).map(place).collect();
+        let place = |(v, (from, displacement)): (usize, (&[f64; 2], &[f64; 2]))| {
+            self.standing_at(v as u32).unwrap_or_else(|| self.placement.place(*from, *displacement))
+        };
+        let moves = self.map.vertices.coords().par_iter().zip(&self.displacements);
+        self.coords = moves.enumerate().map(place).collect();
     }
 
     /// Places all vertices and returns what changed.
@@ -216,15 +260,24 @@ impl<'a> Movement<'a> {
         keeps_apart(&before, &after, self.map.ground.metres_per_unit(before[0]), self.slack)
     }
 
-    /// Returns the free vertices and bodies whose displacements make a hit.
-    fn movers(&self, hit: &Hit) -> Vec<u32> {
-        let mover = |vertex: u32| self.body(vertex).map_or(vertex, |body| body.members[0]);
+    /// Returns the free vertices and bodies whose displacements make a hit, and the vertices of it
+    /// that stand.
+    fn met_by(&self, hit: &Hit) -> Met {
         let of = |vertex: &u32| match self.constraints.junctions.hanging_at(*vertex) {
-            Some(hanging) => hanging.anchors.iter().map(|(anchor, _)| mover(*anchor)).collect(),
-            None => vec![mover(*vertex)],
+            Some(hanging) => hanging.anchors.iter().map(|(anchor, _)| *anchor).collect(),
+            None => vec![*vertex],
         };
-        hit.iter().flat_map(of).collect()
+        let all = hit.iter().flat_map(of);
+        let (standing, free): (Vec<u32>, Vec<u32>) = all.partition(|&v| self.standing_at(v).is_some());
+        let mover = |vertex: u32| self.body(vertex).map_or(vertex, |body| body.members[0]);
+        Met { movers: free.into_iter().map(mover).collect(), standing }
     }
+}
+
+/// Returns the mean of vectors; zero of none.
+fn mean(vectors: impl Iterator<Item = [f64; 2]> + Clone) -> [f64; 2] {
+    let count = vectors.clone().count().max(1) as f64;
+    [0, 1].map(|axis| vectors.clone().map(|vector| vector[axis]).sum::<f64>() / count)
 }
 
 fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
@@ -242,7 +295,17 @@ struct Clusters {
 #[derive(Default)]
 struct Cluster {
     members: Vec<u32>,
+    /// The standing vertices that they meet.
+    met: BTreeSet<u32>,
     level: usize,
+}
+
+impl Cluster {
+    /// Returns the least level at which a cluster comes nearer to the standing vertices that it meets:
+    /// below, vertices that move alike, or not at all, would not change, and the search would end.
+    fn least_level(&self) -> usize {
+        if self.met.is_empty() { 0 } else { RIGID + 1 }
+    }
 }
 
 impl Clusters {
@@ -252,27 +315,35 @@ impl Clusters {
 
     /// Joins the vertices of every hit, raises the level of their clusters and returns the roots of
     /// these. Clusters that are frozen cannot be attenuated further and are not among them.
-    fn merge(&mut self, hits: impl Iterator<Item = Vec<u32>>) -> BTreeSet<u32> {
+    fn merge(&mut self, hits: impl Iterator<Item = Met>) -> BTreeSet<u32> {
         let (mut joined, mut again) = (BTreeSet::new(), Vec::new());
-        for movers in hits {
+        for Met { movers, standing } in hits.filter(|met| !met.movers.is_empty()) {
             let roots: BTreeSet<u32> = movers.iter().map(|&v| self.sets.root(v)).collect();
-            if roots.len() == 1 && self.clusters.contains_key(&movers_root(&roots)) {
-                again.push(movers_root(&roots));
-            } else {
-                joined.insert(self.join(roots));
-            }
+            let first = movers_root(&roots);
+            let root = match roots.len() == 1 && self.clusters.contains_key(&first) {
+                true => {
+                    again.push(first);
+                    first
+                }
+                false => {
+                    let root = self.join(roots);
+                    joined.insert(root);
+                    root
+                }
+            };
+            self.clusters.get_mut(&root).expect("it was joined").met.extend(standing);
         }
         let joined: BTreeSet<u32> = joined.into_iter().map(|root| self.sets.root(root)).collect();
         for &root in &joined {
             let cluster = self.clusters.get_mut(&root).expect("it was joined");
-            cluster.level = cluster.level.clamp(1, RIGID);
+            cluster.level = cluster.level.clamp(1, RIGID).max(cluster.least_level());
         }
         let mut touched = joined.clone();
         let again: BTreeSet<u32> = again.into_iter().map(|root| self.sets.root(root)).collect();
         for root in again.difference(&joined) {
             let cluster = self.clusters.get_mut(root).expect("it was joined before");
             if cluster.level < FROZEN {
-                cluster.level += 1;
+                cluster.level = (cluster.level + 1).max(cluster.least_level());
                 touched.insert(*root);
             }
         }
@@ -283,12 +354,13 @@ impl Clusters {
         let size = |root: &u32| self.clusters.get(root).map_or(1, |cluster| cluster.members.len());
         let largest =
             *roots.iter().max_by_key(|root| (size(root), u32::MAX - **root)).expect("a hit has vertices");
-        let single = |root: u32| Cluster { members: vec![root], level: 0 };
+        let single = |root: u32| Cluster { members: vec![root], ..Cluster::default() };
         let mut all = self.clusters.remove(&largest).unwrap_or_else(|| single(largest));
         for root in roots.into_iter().filter(|&root| root != largest) {
             let other = self.clusters.remove(&root).unwrap_or_else(|| single(root));
             self.sets.put_under(root, largest);
             all.members.extend(other.members);
+            all.met.extend(other.met);
             all.level = all.level.max(other.level);
         }
         self.clusters.insert(largest, all);

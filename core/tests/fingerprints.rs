@@ -5,19 +5,22 @@ use meshmark_core::{
     agreement::{Agreement, Evidence},
     carrier::Carrier,
     deformation::Prediction,
-    embedding,
+    embedding::{self, Marked},
     estimation::Estimates,
-    fingerprint::{self, FingerprintEmbedding, PilotsAlone, check_score, embed, pilots, recipient_signs},
+    fingerprint::{
+        self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, pilots, recipient_signs,
+    },
     ground::Ground,
     key::SecretKey,
     map::Map,
     map_data::{ChainKind, MapData},
     message::Message,
     modulation::{SpreadMessage, displacements_m},
-    mosaic::wealth_log10,
+    mosaic::{View, wealth_log10},
     options::{Parameters, Rigidity},
-    part::PartDigest,
+    part::Parts,
     patches::Patches,
+    series::Series,
     signs::Signs,
 };
 
@@ -42,6 +45,18 @@ fn displaced(town: &MapData, coords: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
     pairs.map(|(from, to)| Some([to[0] - from[0], to[1] - from[1]])).collect()
 }
 
+/// Marks a map of one part for a recipient.
+fn embed(
+    map: &Map,
+    key: &SecretKey,
+    recipient: &str,
+    coefficients: usize,
+    parameters: &Parameters,
+) -> Result<Marked, Error> {
+    let series = Series::of_one(*map, parameters);
+    fingerprint::embed(&series, key, recipient, coefficients).map(|(marked, _)| marked)
+}
+
 fn estimates(map: &Map, observed: &[Option<[f64; 2]>], parameters: &Parameters) -> Estimates {
     let patches = Patches::new(map, parameters).unwrap();
     let noise = Prediction::of_noise(0.01, observed.len());
@@ -49,7 +64,7 @@ fn estimates(map: &Map, observed: &[Option<[f64; 2]>], parameters: &Parameters) 
 }
 
 fn agreement(town: &MapData, seen: &Estimates, recipient: &str) -> Agreement {
-    let signs = recipient_signs(&key(), &PartDigest::of(&town.vertices), recipient);
+    let signs = recipient_signs(&key(), &Parts::whole(&town.vertices), recipient);
     Evidence::of_recipients(seen).agreement(&signs)
 }
 
@@ -68,7 +83,7 @@ fn a_copy_names_its_recipient_and_nobody_else_whole_or_damaged_in_every_shape() 
         let (least_score, least_share) = if shape == Rigidity::Free { (42.0, 0.99) } else { (28.0, 0.75) };
         assert!(own.score > least_score, "{shape:?} {own:?}");
         assert!(own.agreeing as f64 > least_share * own.signs as f64, "{shape:?} {own:?}");
-        let part = PartDigest::of(&town.vertices);
+        let part = Parts::whole(&town.vertices);
         assert!(Evidence::of_pilots(&whole).agreement(&pilots(&key(), &part)).score > 10.0);
         observed.iter_mut().enumerate().filter(|(i, _)| i % 3 > 0).for_each(|(_, o)| *o = None);
         let third = estimates(&map, &observed, &parameters);
@@ -89,7 +104,8 @@ fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
     let town = town();
     let (map, key, parameters) =
         (town.on(&Ground::METRES, &Ground::METRES), key(), Parameters::of_fingerprint());
-    let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
+    let series = Series::of_one(map, &parameters);
+    let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let embedding = embedding.for_many().unwrap();
     let names = ["ACME", "Öster AB"];
     let all = names.map(|name| embedding.fingerprint(name));
@@ -183,7 +199,7 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
         signs_of_copy(&map, &town, &copy.coords, &parameters)
     });
     let public =
-        |name: &str| recipient_signs(&SecretKey::from_bytes([0; 32]), &PartDigest::of(&town.vertices), name);
+        |name: &str| recipient_signs(&SecretKey::from_bytes([0; 32]), &Parts::whole(&town.vertices), name);
     let product = |x: Vec<f64>, y: Vec<f64>| x.iter().zip(&y).map(|(x, y)| x * y).collect::<Vec<_>>();
     let as_it_is = |patch, axis, count| of_axis(&copies[0], patch, axis, count);
     let renamed = |patch, axis, count| {
@@ -212,13 +228,18 @@ fn exact_copies_of_others_forge_a_message_but_no_fingerprint() {
 fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)> {
     let town = town();
     let map = town.on(&Ground::METRES, &Ground::METRES);
-    let (key, part, parameters) = (key(), PartDigest::of(&town.vertices), Parameters::of_fingerprint());
+    let (key, part, parameters) = (key(), Parts::whole(&town.vertices), Parameters::of_fingerprint());
     let copy =
         |n: usize| embed(&map, &key, &format!("member {n}"), COEFFICIENTS, &parameters).unwrap().coords;
     let copies: Vec<Vec<[f64; 2]>> = (0..members).map(copy).collect();
     let names = (0..members).map(|n| format!("member {n}")).chain((0..others).map(|n| format!("other {n}")));
-    let signs: Vec<_> = names.map(|name| recipient_signs(&key, &part, &name)).collect();
+    let names: Vec<String> = names.collect();
+    let signs: Vec<_> = names.iter().map(|name| recipient_signs(&key, &part, name)).collect();
+    let marks: Vec<_> = names.iter().map(|name| Fingerprint::new(&key, &part, name)).collect();
     let patches = Patches::new(&map, &parameters).unwrap();
+    let copies_m = displacements_m(&patches, &marks, COEFFICIENTS, &parameters).unwrap();
+    let pilots_m = displacements_m(&patches, &[PilotsAlone(pilots(&key, &part))], COEFFICIENTS, &parameters);
+    let pilots_m = pilots_m.unwrap().remove(0);
     let owner = |n: usize| n * 7919 % 101 % members;
     let least = |v: usize| [0, 1].map(|a| copies.iter().map(|copy| copy[v][a]).fold(f64::MAX, f64::min));
     let vertices = 0..town.vertices.coords().len();
@@ -229,9 +250,9 @@ fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)
     ];
     let bet = |(name, suspect): (&'static str, Vec<[f64; 2]>)| {
         let observed = displaced(&town, &suspect);
-        let pilots = pilots(&key, &part);
-        let wealth =
-            wealth_log10(&patches, &[&observed], COEFFICIENTS, &parameters, &pilots, &signs).unwrap();
+        let views = [View::new(&observed, &copies_m, &pilots_m)];
+        let how = (COEFFICIENTS, &parameters);
+        let wealth = wealth_log10(&patches, &views, how, &pilots(&key, &part), (&signs, &copies_m)).unwrap();
         (name, wealth[..members].to_vec(), wealth[members..].to_vec())
     };
     mixtures.into_iter().map(bet).collect()
@@ -240,7 +261,7 @@ fn bets(members: usize, others: usize) -> Vec<(&'static str, Vec<f64>, Vec<f64>)
 #[test]
 fn every_member_of_a_mosaic_wins_and_the_others_win_no_more_often_than_they_may() {
     for (mixture, members, others) in bets(8, 150) {
-        assert!(members.iter().all(|wealth| *wealth > 12.0), "{mixture}: {members:?}");
+        assert!(members.iter().all(|wealth| *wealth > 60.0), "{mixture}: {members:?}");
         // A wealth of w comes with a probability of at most 1 / w; the bounds have p < 10⁻⁶.
         let above = |wealth: f64| others.iter().filter(|other| **other >= wealth).count();
         assert!(above(0.5) <= 80 && above(1.0) <= 40 && above(4.0) == 0, "{mixture}: {others:?}");
@@ -254,7 +275,7 @@ fn an_average_of_many_copies_shows_its_members_once_the_pilots_are_taken_out() {
     const MEMBERS: usize = 24;
     let town = town();
     let map = town.on(&Ground::METRES, &Ground::METRES);
-    let (key, part, parameters) = (key(), PartDigest::of(&town.vertices), Parameters::of_fingerprint());
+    let (key, part, parameters) = (key(), Parts::whole(&town.vertices), Parameters::of_fingerprint());
     let name = |n: usize| format!("member {n}");
     let copies: Vec<Vec<[f64; 2]>> = (0..MEMBERS)
         .map(|n| embed(&map, &key, &name(n), COEFFICIENTS, &parameters).unwrap().coords)

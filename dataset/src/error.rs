@@ -34,6 +34,22 @@ pub enum Error {
     NotKept { driver: &'static str, layer: String, difference: Difference },
     File { action: Action, path: PathBuf, source: io::Error },
     Exists { path: String, remedy: &'static str },
+    NoBase,
+    NoBaseReference,
+    BaseUnread { base: PathBuf, source: io::Error },
+    BaseMalformed { base: PathBuf, source: meshmark_core::Error },
+    BaseOfMessage { base: PathBuf },
+    BaseOfOtherKey { base: PathBuf },
+    BaseOfOtherVersion { base: PathBuf },
+    BaseInOtherCrs { base: PathBuf },
+    BaseOfOtherMark { base: PathBuf, option: &'static str, made_with: Option<String>, given: Option<String> },
+    ContradictingBase { base: PathBuf },
+    BaseOfThisEdition { base: PathBuf },
+    BaseOfOtherParts { base: PathBuf },
+    NoRecordOfBase { folder: PathBuf },
+    LostBase { vertices_sha256: String },
+    OtherBase { base: String },
+    BaseReferenceUnread { path: PathBuf, reason: String },
     Gdal(GdalError),
     Core(meshmark_core::Error),
 }
@@ -82,7 +98,8 @@ impl std::error::Error for Error {
         match self {
             Error::Geometry { source, .. } => Some(source),
             Error::Reprojection { source, .. } => Some(source),
-            Error::File { source, .. } => Some(source),
+            Error::File { source, .. } | Error::BaseUnread { source, .. } => Some(source),
+            Error::BaseMalformed { source, .. } => Some(source),
             Error::Gdal(source) => Some(source),
             Error::Core(source) => Some(source),
             _ => None,
@@ -103,6 +120,27 @@ impl From<meshmark_core::Error> for Error {
 }
 
 impl Error {
+    /// Returns whether a map lacks the layers or the CRS that options give it.
+    pub fn is_of_other_layers(&self) -> bool {
+        matches!(self, Error::UnknownLayer { .. } | Error::ContradictingSrs { .. })
+    }
+
+    /// Returns whether bases do not belong to a map, to its key or to each other.
+    pub fn is_of_other_base(&self) -> bool {
+        matches!(
+            self,
+            Error::LostBase { .. }
+                | Error::OtherBase { .. }
+                | Error::ContradictingBase { .. }
+                | Error::BaseOfThisEdition { .. }
+                | Error::BaseOfOtherParts { .. }
+                | Error::BaseOfOtherKey { .. }
+                | Error::BaseInOtherCrs { .. }
+                | Error::BaseOfOtherMark { .. }
+                | Error::BaseOfOtherVersion { .. }
+        )
+    }
+
     /// Returns the fault of a feature without the remedy.
     pub(crate) fn fault(&self) -> String {
         match self {
@@ -120,6 +158,7 @@ impl Error {
     /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
         let srs = |crs: &str| spelling.value("SRS", crs);
+        let base = |path: &Path| spelling.value("BASE", path.display());
         match self {
             Error::NoLayers => "the map has no vector layer: give a vector dataset that GDAL can open".into(),
             Error::UnknownLayer { name, known } => {
@@ -217,6 +256,83 @@ impl Error {
             ),
             Error::File { action, path, source } => format!("{action} {} failed: {source}", path.display()),
             Error::Exists { path, remedy } => format!("{path} exists: {remedy}"),
+            Error::NoBase => format!(
+                "{} is given without {}: name the records of those editions, too",
+                spelling.name("BASE_REFERENCE"),
+                spelling.name("BASE")
+            ),
+            Error::NoBaseReference => format!(
+                "{} is given without {}: name the references of those editions, too",
+                spelling.name("BASE"),
+                spelling.name("BASE_REFERENCE")
+            ),
+            Error::BaseUnread { base: path, source } => {
+                format!("{} cannot be read ({source}): name a record, or a folder of records", base(path))
+            }
+            Error::BaseMalformed { base: path, source } => {
+                format!("{} is no base: {}", base(path), source.text(spelling))
+            }
+            Error::BaseOfMessage { base: path } => format!(
+                "{} is the record of a message, and a fingerprint alone can be a base: mark this edition without {}",
+                base(path),
+                spelling.name("BASE")
+            ),
+            Error::BaseOfOtherKey { base: path } => {
+                format!("{} was made with another key: give the key of the series", base(path))
+            }
+            Error::BaseOfOtherVersion { base: path } => format!(
+                "{} was made with another number of coefficients than this version of meshmark takes: mark with that version",
+                base(path)
+            ),
+            Error::BaseInOtherCrs { base: path } => format!(
+                "{} is of a map in another CRS, where no vertex is the same: bring the new edition into that CRS first",
+                base(path)
+            ),
+            Error::BaseOfOtherMark { base: path, option, made_with, given } => {
+                let value = |value: &Option<String>| match value {
+                    Some(value) => format!("with {}", spelling.value(option, value)),
+                    None => format!("without {}", spelling.name(option)),
+                };
+                format!(
+                    "{} was made {}, and this edition is marked {}: all editions of a series are marked alike",
+                    base(path),
+                    value(made_with),
+                    value(given)
+                )
+            }
+            Error::BaseOfThisEdition { base: path } => format!(
+                "{} is of this very edition, and not of an earlier one: name the record of the edition before, or leave \
+                 {} out",
+                base(path),
+                spelling.name("BASE")
+            ),
+            Error::BaseOfOtherParts { base: path } => {
+                format!(
+                    "{} names parts that are not those of its reference: give the record as it was written",
+                    base(path)
+                )
+            }
+            Error::ContradictingBase { base: path } => format!(
+                "{} has an edition that another base has with other layers or bases, so its vertices have two places: name \
+                 one of them",
+                base(path)
+            ),
+            Error::NoRecordOfBase { folder } => {
+                format!("{} is a folder without records: name the folder they were written to", base(folder))
+            }
+            Error::LostBase { vertices_sha256 } => format!(
+                "no map given is the reference of a base whose vertices have the SHA-256 {vertices_sha256}: give its file, \
+                 unchanged, with those of all editions that the bases rest on"
+            ),
+            Error::OtherBase { base: named } => format!(
+                "no vertex of the map is in the references of {}, so it is no edition of the same map: leave {} out, or \
+                 name the records of its earlier editions",
+                spelling.value("BASE", named),
+                spelling.name("BASE")
+            ),
+            Error::BaseReferenceUnread { path, reason } => {
+                format!("{} cannot be read: {reason}", spelling.value("BASE_REFERENCE", path.display()))
+            }
             Error::Gdal(error) => error.to_string(),
             Error::Core(error) => error.text(spelling),
         }

@@ -64,6 +64,14 @@ impl Format {
         })
     }
 
+    /// Returns the name of a file without the ending of its format; `None` where it has none.
+    pub fn stem(file_name: &str) -> Option<&str> {
+        let lower = file_name.to_ascii_lowercase();
+        let endings = FORMATS.iter().flat_map(|format| format.endings);
+        let longest = endings.filter(|ending| lower.ends_with(**ending)).map(|ending| ending.len()).max()?;
+        Some(&file_name[..file_name.len() - longest])
+    }
+
     /// Returns the ending of the names of its files.
     pub fn ending(&self) -> &'static str {
         self.endings[0]

@@ -5,6 +5,7 @@
 #![warn(missing_docs)]
 
 mod assumption;
+mod bases;
 mod chains;
 mod crs;
 mod crs_wkt;
@@ -37,6 +38,7 @@ pub mod wkb;
 pub mod workplace;
 
 pub use assumption::{likely_assumptions, overlaps};
+pub use bases::{Bases, ReadBase};
 pub use crs::{Assumption, CoordinateSystem, parse_srs};
 pub use damage::damage_warning;
 pub use error::{Action, Error, Result, file_error};

@@ -7,13 +7,14 @@ use crate::{
 };
 use meshmark_core::{
     embedding::Marked,
-    fingerprint_record::{self, CopyEntry, FingerprintRecord, FingerprintShape, PartEntry, ReferenceEntry},
+    fingerprint_record::{
+        self, BaseEntry, CopyEntry, FingerprintRecord, FingerprintShape, PartEntry, ReferenceEntry,
+    },
     ground::Ground,
     key::SecretKey,
     map::Map,
     message::{ADVISED_BITS, LEAST_IDENTIFYING_BITS, Message},
     options::{Options, Parameters, Spelling, Subject},
-    part::PartDigest,
     record::{self, Distortion, Record, Reference, TopologyEntry},
     recorded::Recorded,
     vertices::VertexTable,
@@ -206,12 +207,21 @@ fn outlines<'a>(
     Outlines { count: geometries.len(), get }
 }
 
+/// The parts of a fingerprint, and the editions that the map rests on.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Lineage {
+    /// The parts of the map and its bases; none of a message.
+    pub parts: Vec<PartEntry>,
+    /// The bases.
+    pub bases: Vec<BaseEntry>,
+}
+
 /// Returns the record of a marking, a fingerprint or a message as the options have it.
 pub fn recorded(
     options: &Options,
     subject: &Subject,
     key: &SecretKey,
-    reference: Reference,
+    (reference, lineage): (Reference, Lineage),
     distortion: Distortion,
 ) -> Recorded {
     match (options.coefficients, subject) {
@@ -220,7 +230,7 @@ pub fn recorded(
             recipient,
             key,
             coefficients,
-            reference,
+            (reference, lineage),
             distortion,
         )),
         _ => Recorded::Message(record(options, subject, key, reference, distortion)),
@@ -258,17 +268,16 @@ pub fn record(
 }
 
 /// Returns the record of a marking for a recipient with a fingerprint of `coefficients`
-/// coefficients. The map is one part; the digests of its files are not known here.
+/// coefficients. The digests of the files of the map are not known here.
 pub fn fingerprint_record(
     options: &Options,
     recipient: &str,
     key: &SecretKey,
     coefficients: usize,
-    reference: Reference,
+    (reference, lineage): (Reference, Lineage),
     distortion: Distortion,
 ) -> FingerprintRecord {
-    let Reference { vertices, patches, vertices_sha256, crs } = reference;
-    let sha256 = PartDigest::try_from(vertices_sha256.clone()).expect("it is the digest of the vertices");
+    let (Reference { vertices, vertices_sha256, crs, .. }, Lineage { parts, bases }) = (reference, lineage);
     FingerprintRecord {
         meshmark_record: fingerprint_record::VERSION,
         software: SOFTWARE.into(),
@@ -279,7 +288,8 @@ pub fn fingerprint_record(
         srs: options.srs.clone(),
         reference: ReferenceEntry { vertices, vertices_sha256, file_sha256: None, crs },
         copy: CopyEntry { file_sha256: None },
-        parts: vec![PartEntry { sha256, vertices, patches }],
+        parts,
+        bases,
         distortion,
     }
 }

@@ -225,7 +225,7 @@ impl Layout {
 /// of neither.
 fn decode_type(code: u32) -> (u32, usize) {
     let flags = usize::from(code & 0x8000_0000 != 0) + usize::from(code & 0x4000_0000 != 0);
-    let iso = code & 0x0fff_ffff;
+    let iso = code & 0x3fff_ffff;
     let thousands = match iso / 1000 {
         0 => 0,
         1 | 2 => 1,
@@ -300,7 +300,7 @@ mod tests {
         let result = map_coordinates::<WkbError>(&mut unknown, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::UnknownType(99)));
         // GDAL reads the last byte of such a code alone.
-        for code in [4001u32, 0xcf09, 0x0fff_ffff] {
+        for code in [4001u32, 0xcf09, 0x0fff_ffff, 0x1000_0001, 0x2000_0001] {
             let mut beyond = [&[1][..], &code.to_le_bytes(), &[0; 32]].concat();
             let result = map_coordinates::<WkbError>(&mut beyond, &mut |_, p| Ok(p));
             assert_eq!(result, Err(WkbError::UnknownType(code)));

@@ -17,7 +17,7 @@ use meshmark_core::{
     deformation::Prediction,
     fingerprint::{Fingerprint, PilotsAlone},
     modulation::displacements_m,
-    mosaic,
+    mosaic::{self, View},
     options::Parameters,
     signs::Sequence,
 };
@@ -32,9 +32,7 @@ const MOST_NOISE_M: f64 = 0.1;
 /// The noise of copies that were mixed and not changed further, metres: averages have nearly none,
 /// medians and extremes that of their choice.
 const MIXED_NOISES_M: [f64; 3] = [0.001, 0.02, 0.1];
-/// Bets are repeated on what the named recipients left, so often at most.
-const MOST_ROUNDS: usize = 4;
-/// So many pairs of a recipient and a patch are bet on in a round at most.
+/// So many pairs of a recipient and a patch are bet on at most.
 const MOST_BETS: usize = 8000;
 /// Named recipients that leave less than this share of the energy explain the suspect.
 const LEAST_REST: f64 = 0.1;
@@ -54,36 +52,36 @@ impl Matched<'_> {
         (tried, significance): (usize, f64),
     ) -> Result<Vec<Standing>> {
         let evidence = Evidence::of_recipients(&seen.estimates);
-        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own.clone()).collect();
         let mut observed = seen.observed.clone();
         let shows_vertices =
             seen.disturbance.deformation.noise_m <= MOST_NOISE_M && !seen.observations.is_of_features();
         recipients::name_in_rounds(&evidence, &signs, (tried, significance), |named, new| {
-            let named: Vec<Sequence> = named.iter().map(|&k| signs[k]).collect();
+            let named: Vec<Sequence> = named.iter().map(|&k| signs[k].clone()).collect();
             let rest = evidence.without(&named);
             if !shows_vertices || rest.energy() < LEAST_REST * evidence.energy() {
                 return Ok(rest);
             }
-            let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k]).collect();
+            let new: Vec<Fingerprint> = new.iter().map(|&k| candidates[k].clone()).collect();
             let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
             let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
-            forget(&mut observed, &copies_m, |vertex| seen.disturbance.displacement_m[vertex]);
+            forget(&mut observed, &copies_m, &seen.disturbance.displacement_m);
             let estimates =
                 self.estimates(self.vertices(), &observed, &seen.disturbance, parameters, &|_| ())?;
             Ok(Evidence::of_recipients(&estimates).without(&named))
         })
     }
 
-    /// Bets on the signs of candidates that are not named, where a share of the coordinates may be
-    /// theirs: those with the best scores, up to [`MOST_BETS`]. The suspect is seen as it
-    /// stands and as it is registered: the least values of many copies shift a map as a whole,
-    /// which the registration undoes. No deformation is taken out, as that of polygon groups has
-    /// much of what the owners of single features put there. Vertices of recipients that are named
-    /// count as not found in the next round.
+    /// Looks for candidates that the scores do not name: by scores without the pilots and beside the
+    /// others, and by bets on the signs of those with the best scores, up to [`MOST_BETS`], since a
+    /// share of the coordinates may be theirs. The suspect is seen as it stands and as it is
+    /// registered: the least values of many copies shift a map as a whole, which the registration
+    /// undoes. No deformation is taken out, as that of polygon groups has much of what the owners of
+    /// single features put there.
     ///
     /// # Errors
     /// Fails when a patch cannot be solved.
-    pub fn bet_on_shares(
+    pub fn look_for_shares(
         &self,
         seen: &Estimated,
         candidates: &[Fingerprint],
@@ -96,63 +94,53 @@ impl Matched<'_> {
             return Ok(());
         }
         let (reference, suspect) = (self.reference.data.vertices.coords(), self.suspect.vertices.coords());
-        let mut views = [suspect, &self.moved]
+        let views = [suspect, &self.moved]
             .map(|places| seen.matches.displacements_m(reference, places, &self.reference.ground));
-        self.score_without_pilots(&views[0], candidates, pilots, parameters, tried, standings)?;
         let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        for round in 1..=MOST_ROUNDS {
-            let chosen = self.chosen(standings);
-            let signs: Vec<Sequence> = chosen.iter().map(|&k| candidates[k].own).collect();
-            let of_views = views.each_ref().map(Vec::as_slice);
-            let wealth = mosaic::wealth_log10(patches, &of_views, coefficients, parameters, pilots, &signs)?;
-            chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, round, tried));
-            let new = chosen.iter().filter(|&&k| standings[k].is_named).map(|&k| candidates[k]);
-            let new: Vec<Fingerprint> = new.collect();
-            if new.is_empty() || round == MOST_ROUNDS || standings.iter().all(|standing| standing.is_named) {
-                break;
-            }
-            let copies_m = displacements_m(patches, &new, coefficients, parameters)?;
-            views.iter_mut().for_each(|view| forget(view, &copies_m, |_| [0.0; 2]));
-        }
+        let pilots_m =
+            displacements_m(patches, &[PilotsAlone(pilots.clone())], coefficients, parameters)?.remove(0);
+        self.score_without_pilots(&views[0], &pilots_m, candidates, parameters, tried, standings)?;
+        let chosen = self.chosen(standings);
+        let of_chosen: Vec<Fingerprint> = chosen.iter().map(|&k| candidates[k].clone()).collect();
+        let signs: Vec<Sequence> = of_chosen.iter().map(|candidate| candidate.own.clone()).collect();
+        let copies_m = displacements_m(patches, &of_chosen, coefficients, parameters)?;
+        let views = views.each_ref().map(|view| View::new(view, &copies_m, &pilots_m));
+        let wealth =
+            mosaic::wealth_log10(patches, &views, (coefficients, parameters), pilots, (&signs, &copies_m))?;
+        chosen.iter().zip(wealth).for_each(|(&k, wealth)| standings[k].bet(wealth, tried));
         Ok(())
     }
 
-    /// Scores all candidates without the pilots, for each noise that mixtures may have. An
-    /// average of many copies has the pilots of one copy and a mark of a few millimetres for each
-    /// member; as shapes that keep their angles have less freedom than there are signs, the pilots
-    /// disturb the estimates of all other signs.
+    /// Scores all candidates without the pilots and beside the others, for each noise that mixtures
+    /// may have. An average of many copies has the pilots of one copy and a mark of a few millimetres
+    /// for each member; as shapes that keep their angles have less freedom than there are signs, the
+    /// pilots disturb the estimates of all other signs.
     fn score_without_pilots(
         &self,
         observed: &[Option<[f64; 2]>],
+        pilots_m: &[[f64; 2]],
         candidates: &[Fingerprint],
-        pilots: &Sequence,
         parameters: &Parameters,
-        (tried, significance): (usize, f64),
+        tried: (usize, f64),
         standings: &mut [Standing],
     ) -> Result<()> {
-        let (patches, coefficients) = (&self.reference.patches, self.reference.carriers);
-        let of_pilots = displacements_m(patches, &[PilotsAlone(*pilots)], coefficients, parameters)?;
         let without =
             |(o, pilot): (&Option<[f64; 2]>, &[f64; 2])| o.map(|o| [0, 1].map(|axis| o[axis] - pilot[axis]));
-        let observed: Vec<_> = observed.iter().zip(&of_pilots[0]).map(without).collect();
-        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own).collect();
-        let level = significance / 10f64.powf(recipients::FURTHER_TESTS_LOG10);
+        let observed: Vec<_> = observed.iter().zip(pilots_m).map(without).collect();
+        let signs: Vec<Sequence> = candidates.iter().map(|candidate| candidate.own.clone()).collect();
+        let least_score = recipients::suspected_score(tried.0);
         for noise_m in MIXED_NOISES_M {
             let noise = Prediction::of_noise(noise_m, observed.len());
             let estimates = self.estimates(self.vertices(), &observed, &noise, parameters, &|_| ())?;
-            let evidence = Evidence::of_recipients(&estimates);
-            let rest = |named: &[usize], _: &[usize]| {
-                Ok(evidence.without(&named.iter().map(|&k| signs[k]).collect::<Vec<_>>()))
-            };
-            let again = recipients::name_in_rounds(&evidence, &signs, (tried, level), rest)?;
-            standings.iter_mut().zip(again).for_each(|(standing, again)| standing.take(again, significance));
+            let scores = Evidence::of_recipients(&estimates).scores_beside_others(&signs, least_score);
+            standings.iter_mut().zip(scores).for_each(|(standing, score)| standing.take(score, tried));
         }
         Ok(())
     }
 
-    /// Returns the candidates on whose signs bets are made, by their scores.
+    /// Returns the candidates on whose signs bets are made, those with the best scores first.
     fn chosen(&self, standings: &[Standing]) -> Vec<usize> {
-        let mut chosen: Vec<usize> = (0..standings.len()).filter(|&k| !standings[k].is_named).collect();
+        let mut chosen: Vec<usize> = (0..standings.len()).collect();
         chosen.sort_by(|&a, &b| standings[b].score.total_cmp(&standings[a].score).then(a.cmp(&b)));
         chosen.truncate((MOST_BETS / self.reference.patches.as_slice().len()).max(1));
         chosen
@@ -161,15 +149,11 @@ impl Matched<'_> {
 
 /// Forgets the vertices that lie where copies have them, which are displaced so far by their marks,
 /// and by `other_m` besides, metres.
-fn forget(
-    observed: &mut [Option<[f64; 2]>],
-    copies_m: &[Vec<[f64; 2]>],
-    other_m: impl Fn(usize) -> [f64; 2],
-) {
+fn forget(observed: &mut [Option<[f64; 2]>], copies_m: &[Vec<[f64; 2]>], other_m: &[[f64; 2]]) {
     let found = observed.iter().flatten().count() as f64;
     for copy_m in copies_m {
         let is_own = |vertex: &usize| {
-            let other_m = other_m(*vertex);
+            let other_m = other_m[*vertex];
             let gap = |o: [f64; 2]| [0, 1].map(|axis| o[axis] - other_m[axis] - copy_m[*vertex][axis]);
             observed[*vertex].map(gap).is_some_and(|[x, y]| x.hypot(y) <= SAME_M)
         };

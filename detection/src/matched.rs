@@ -6,7 +6,8 @@ use crate::{
     registration::{Registration, place_pairs},
 };
 use meshmark_core::{
-    Result, ground::Ground, map::Map, map_data::MapData, options::Parameters, patches::Patches,
+    Result, ground::Ground, map::Map, map_data::MapData, options::Parameters, part::Parts, patches::Patches,
+    series::Series,
 };
 use rstar::{AABB, Envelope};
 use std::sync::OnceLock;
@@ -22,6 +23,8 @@ pub struct Reference<'a> {
     pub ground: Ground,
     /// The patches of its mesh.
     pub patches: Patches,
+    /// The parts on which the signs of fingerprints depend.
+    pub parts: Parts,
     /// Number of coefficients of a patch and axis that carry the message.
     pub(crate) carriers: usize,
 }
@@ -33,24 +36,24 @@ impl<'a> Reference<'a> {
     /// Fails when a mark with these parameters does not fit the map.
     pub fn new(data: &'a MapData, map: &Map, bits: usize, parameters: &Parameters) -> Result<Self> {
         let patches = Patches::new(map, parameters)?;
-        let carriers = patches.carriers(bits, parameters)?;
-        Ok(Reference { data, ground: map.ground.clone(), patches, carriers })
+        let (carriers, parts) = (patches.carriers(bits, parameters)?, Parts::whole(&data.vertices));
+        Ok(Reference { data, ground: map.ground.clone(), patches, parts, carriers })
     }
 
-    /// Meshes a map and cuts it into patches, as [`Self::new`] does, for fingerprints of
-    /// `coefficients` coefficients of every patch and axis.
+    /// Meshes the parts of a series and cuts them into patches, as [`Self::new`] does, for
+    /// fingerprints of `coefficients` coefficients of every patch and axis. The map is the newest one
+    /// with the vertices of all, see [`MapData::with_earlier`].
     ///
     /// # Errors
-    /// Fails when such a fingerprint does not fit the map.
+    /// Fails when such a fingerprint does not fit a map.
     pub fn for_fingerprints(
         data: &'a MapData,
         map: &Map,
+        series: &Series,
         coefficients: usize,
-        parameters: &Parameters,
     ) -> Result<Self> {
-        let patches = Patches::new(map, parameters)?;
-        let carriers = patches.check_room(coefficients)?;
-        Ok(Reference { data, ground: map.ground.clone(), patches, carriers })
+        let (patches, parts) = series.patches_on(map, coefficients)?;
+        Ok(Reference { data, ground: map.ground.clone(), patches, parts, carriers: coefficients })
     }
 }
 

@@ -28,7 +28,6 @@ use meshmark_core::{
     message::Message,
     modulation::{SpreadMessage, displacements_m},
     options::Parameters,
-    part::PartDigest,
     signs::Sequence,
 };
 use rayon::prelude::*;
@@ -106,9 +105,9 @@ impl Power {
         if recipients::shows_key(seen.key_agreement(pilots).score) {
             return Ok(Power::KeyShows);
         }
-        let Reference { patches, carriers, data, .. } = matched.reference;
-        let signs = recipient_signs(&trial_key(matched), &PartDigest::of(&data.vertices), "trial mark");
-        let displacement_m = displacements_m(patches, &[signs], *carriers, parameters)?;
+        let Reference { patches, carriers, parts, .. } = matched.reference;
+        let signs = recipient_signs(&trial_key(matched), parts, "trial mark");
+        let displacement_m = displacements_m(patches, std::slice::from_ref(&signs), *carriers, parameters)?;
         let trial = marked(matched, seen.observations, &displacement_m[0]);
         if trial.is_chance(Demodulator::Joint) {
             return Ok(Power::Trial(0.0));

@@ -7,7 +7,8 @@ use meshmark_core::{
     key::SecretKey,
     map_data::{ChainKind, MapData},
     options::Parameters,
-    part::PartDigest,
+    part::Parts,
+    series::Series,
     signs::Sequence,
 };
 use meshmark_detection::{
@@ -31,7 +32,7 @@ const SIGNIFICANCE: f64 = 1e-6;
 struct Town {
     data: MapData,
     key: SecretKey,
-    part: PartDigest,
+    part: Parts,
     /// Corner after corner, ring after ring.
     corners: Vec<[f64; 2]>,
     /// The same in the copies.
@@ -45,7 +46,8 @@ static TOWN: LazyLock<Town> = LazyLock::new(|| {
     let (data, indices) = rings(corners.clone());
     let (key, parameters) = (SecretKey::from_bytes([7; 32]), Parameters::of_fingerprint());
     let map = data.on(&Ground::METRES, &Ground::METRES);
-    let embedding = FingerprintEmbedding::new(&map, &key, COEFFICIENTS, &parameters).unwrap();
+    let series = Series::of_one(map, &parameters);
+    let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let marks: Vec<_> = (0..COPIES).map(|k| embedding.fingerprint(&name(k))).collect();
     let wanted = embedding.wanted(&marks, &|_| ()).unwrap();
     let copy = |(mark, wanted): (_, &Vec<[f64; 2]>)| {
@@ -53,7 +55,7 @@ static TOWN: LazyLock<Town> = LazyLock::new(|| {
         indices.iter().map(|&vertex| coords[vertex as usize]).collect()
     };
     let copies = marks.iter().zip(&wanted).map(copy).collect();
-    let part = embedding.part();
+    let part = embedding.parts().clone();
     Town { data, key, part, corners, copies }
 });
 
@@ -83,7 +85,8 @@ fn random(i: usize) -> f64 {
 fn with_suspect<T>(corners: Vec<[f64; 2]>, f: impl FnOnce(&Matched) -> T) -> T {
     let town = &TOWN;
     let (map, parameters) = (town.data.on(&Ground::METRES, &Ground::METRES), Parameters::of_fingerprint());
-    let reference = Reference::for_fingerprints(&town.data, &map, COEFFICIENTS, &parameters).unwrap();
+    let series = Series::of_one(map, &parameters);
+    let reference = Reference::for_fingerprints(&town.data, &map, &series, COEFFICIENTS).unwrap();
     let (suspect, _) = rings(corners);
     let registration = Registrar::new(&town.data, &Ground::METRES, 1.0).register(&suspect, Start::None);
     f(&Matched::new(&reference, &suspect, &registration, RadiusChoice::FromData))

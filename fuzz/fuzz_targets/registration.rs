@@ -10,6 +10,7 @@ use meshmark_core::{
     ground::Ground,
     map_data::{ChainKind, Dimension, Label, MapData, Polyline},
     options::Parameters,
+    series::Series,
 };
 use meshmark_detection::{
     Matched, Reference,
@@ -44,7 +45,8 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let parameters = Parameters { patch_size: PATCH_SIZE, ..Parameters::of_fingerprint() };
     let on_ground = reference.on(&ground, &ground);
-    let Ok(prepared) = Reference::for_fingerprints(&reference, &on_ground, 1, &parameters) else { return };
+    let series = Series::of_one(on_ground, &parameters);
+    let Ok(prepared) = Reference::for_fingerprints(&reference, &on_ground, &series, 1) else { return };
     let matched = Matched::new(&prepared, &suspect, &registration, RadiusChoice::FromData);
     assert!(matched.radius.metres > 0.0 && matched.radius.metres.is_finite());
 });

@@ -11,11 +11,12 @@ use meshmark_core::{
     fingerprint_record::FingerprintRecord,
     options::{Options, Parameters},
     patches::Patches,
+    series::Series,
     signs::Signs,
 };
 use meshmark_dataset::{
     Selection, Survey,
-    marking::{self, Unmarked},
+    marking::{self, Lineage, Unmarked},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -42,28 +43,37 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
     let (key, parameters) = (key(), &options.parameters);
     let map = read(&reference_path(), &Selection { geometries: true, ..Selection::default() });
     let on_ground = map.map(parameters).expect("a projected CRS");
-    let embedding = FingerprintEmbedding::new(&on_ground, &key, COEFFICIENTS, parameters).expect("it fits");
+    let series = Series::of_one(on_ground, parameters);
+    let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).expect("it fits");
     let fingerprint = embedding.fingerprint(RECIPIENT);
-    let wanted = embedding.wanted(&[fingerprint], &|_| ()).expect("it converges");
+    let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| ()).expect("it converges");
     let marked = embedding.settle(&fingerprint, &wanted[0]).expect("it is read back");
     let geometries = map.geometries.as_ref().expect("they were requested");
     let distortion = Unmarked::new(geometries, &on_ground).distortion(&marked, parameters);
     let reference = marking::reference(&map, marked.patches);
-    let record = marking::fingerprint_record(&options, RECIPIENT, &key, COEFFICIENTS, reference, distortion);
-    let part = embedding.part();
+    let lineage = Lineage { parts: embedding.part_entries(), ..Lineage::default() };
+    let record = marking::fingerprint_record(
+        &options,
+        RECIPIENT,
+        &key,
+        COEFFICIENTS,
+        (reference, lineage),
+        distortion,
+    );
+    let part = embedding.parts();
     let signs = |signs: &dyn Signs| json!({ "x": plus_minus(&signs.signs(0, 0, COEFFICIENTS)), "y": plus_minus(&signs.signs(0, 1, COEFFICIENTS)) });
     let estimates = estimates(&map, &marked, parameters);
     let agreement = |recipient: &str| {
-        let signs = recipient_signs(&key, &part, recipient);
+        let signs = recipient_signs(&key, part, recipient);
         describe(Evidence::of_recipients(&estimates).agreement(&signs))
     };
     let steps = json!({
         "0_key": { "commitment": key.commitment() },
-        "1_part": { "vertices": map.data.vertices.len(), "sha256": part },
+        "1_part": { "vertices": map.data.vertices.len(), "sha256": part.as_slice()[0].digest },
         "2_signs": {
             "recipient": RECIPIENT,
-            "patch_0_recipient": signs(&recipient_signs(&key, &part, RECIPIENT)),
-            "patch_0_pilots": signs(&pilots(&key, &part)),
+            "patch_0_recipient": signs(&recipient_signs(&key, part, RECIPIENT)),
+            "patch_0_pilots": signs(&pilots(&key, part)),
             "patch_0_fingerprint": signs(&fingerprint),
         },
         "3_marked": {
@@ -80,7 +90,7 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
         "5_agreement": {
             "recipient": agreement(RECIPIENT),
             "other_recipient": agreement(OTHER),
-            "pilots": describe(Evidence::of_pilots(&estimates).agreement(&pilots(&key, &part))),
+            "pilots": describe(Evidence::of_pilots(&estimates).agreement(&pilots(&key, part))),
         },
     });
     (steps, record)

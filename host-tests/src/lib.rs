@@ -13,6 +13,7 @@
 pub mod attacks;
 mod built;
 pub mod contents;
+pub mod editions;
 pub mod experiment;
 pub mod faults;
 pub mod fingerprint_vectors;

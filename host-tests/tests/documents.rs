@@ -72,6 +72,20 @@ fn the_commands_of_the_page_about_many_recipients_work() {
     blocks.iter().for_each(|block| assert_works("docs/distribute.md", &commands(block).join("\n")));
 }
 
+#[test]
+fn the_commands_of_the_page_about_deposits_work() {
+    let blocks = blocks("docs/deposit.md");
+    assert!(!blocks.is_empty());
+    blocks.iter().for_each(|block| assert_works("docs/deposit.md", &commands(block).join("\n")));
+}
+
+#[test]
+fn the_commands_of_the_page_about_series_work() {
+    let blocks = blocks("docs/series.md");
+    assert!(!blocks.is_empty());
+    blocks.iter().for_each(|block| assert_works("docs/series.md", &commands(block).join("\n")));
+}
+
 /// Returns the documents, as paths from the root.
 fn documents() -> Vec<String> {
     let folders = ["", "docs/", "examples/", "fixtures/", "fixtures/vectors/"];

@@ -48,7 +48,7 @@ fn a_copy_names_its_recipient_and_an_average_all_members() {
     let (run, report) = host.verify("map.gpkg", &["--records", "records", "0.gpkg"]);
     assert_eq!((run.code, matching(&report)), (Some(0), vec!["ACME GmbH"]), "{}", run.stdout);
     let members: Vec<Map> = (0..3).map(|n| Map::read(&host.path(&format!("{n}.gpkg"))).unwrap()).collect();
-    Mixture::Average.of(&members, 1).unwrap().write(&host.path("average.gpkg")).unwrap();
+    Mixture::Average.mix(&members, 1).unwrap().write(&host.path("average.gpkg")).unwrap();
     let (run, report) = host.verify("map.gpkg", &["--records", "records", "average.gpkg"]);
     assert_eq!((run.code, matching(&report)), (Some(0), RECIPIENTS[..3].to_vec()), "{}", run.stdout);
     assert_eq!(report["candidates"]["tried"], 4);
@@ -114,7 +114,7 @@ fn every_mixture_of_copies_names_its_members_and_nobody_else() {
     let members: Vec<Map> = (0..3).map(|n| Map::read(&host.path(&format!("{n}.gpkg"))).unwrap()).collect();
     for (mixture, name) in Mixture::ALL {
         let suspect = format!("{name}.gpkg");
-        mixture.of(&members, 1).unwrap().write(&host.path(&suspect)).unwrap();
+        mixture.mix(&members, 1).unwrap().write(&host.path(&suspect)).unwrap();
         let (run, report) = host.verify("map.gpkg", &["--records", "records", &suspect]);
         assert_eq!(
             (run.code, matching(&report)),

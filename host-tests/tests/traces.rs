@@ -1,6 +1,7 @@
 //! Unmarked coordinates in what marking leaves as it is: attributes, foreign members of GeoJSON,
 //! layers that are not marked.
 
+use base64::{Engine, engine::general_purpose::STANDARD};
 use gdal::vector::Geometry;
 use meshmark_host_tests::plugin::{Host, fixture};
 use serde_json::{Map, Value, json};
@@ -25,9 +26,8 @@ impl Building<'_> {
         Geometry::from_geojson(&self.geometry.to_string()).unwrap().wkt().unwrap()
     }
 
-    fn wkb(&self) -> String {
-        let wkb = Geometry::from_geojson(&self.geometry.to_string()).unwrap().wkb().unwrap();
-        meshmark_core::hex::encode(&wkb)
+    fn wkb(&self) -> Vec<u8> {
+        Geometry::from_geojson(&self.geometry.to_string()).unwrap().wkb().unwrap()
     }
 }
 
@@ -117,7 +117,8 @@ const KINDS: &[Kind] = &[
     ("GeoJSON", r#"attribute "g""#, |b| json!({"g": b.geometry.to_string()})),
     ("GeoJSON in degrees", r#"attribute "g""#, |b| json!({"g": b.degrees.to_string()})),
     ("EWKT", r#"attribute "g""#, |b| json!({"g": format!("SRID=3067;{}", b.wkt())})),
-    ("hexadecimal WKB", r#"attribute "g""#, |b| json!({"g": b.wkb()})),
+    ("hexadecimal WKB", r#"attribute "g""#, |b| json!({"g": meshmark_core::hex::encode(&b.wkb())})),
+    ("base64 of WKB", r#"attribute "g""#, |b| json!({"g": STANDARD.encode(b.wkb())})),
     (
         "WKT of the last building",
         r#"attribute "g""#,

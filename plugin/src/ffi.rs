@@ -12,7 +12,9 @@ use crate::{
 };
 use gdal_sys::{CPLErr, GDALDatasetH};
 use meshmark_core::options::{creation_option_list_xml, open_option_list_xml};
-use meshmark_dataset::{marked_view::PREFIX, marking::NotMoved, threads, traces::ForeignMembers};
+use meshmark_dataset::{
+    Selection, Survey, marked_view::PREFIX, marking::NotMoved, survey, threads, traces::ForeignMembers,
+};
 use std::{
     ffi::{CString, c_char},
     path::Path,
@@ -233,12 +235,27 @@ pub fn mark(
     let geometry_only = source.read_geometry_only();
     collector.clear();
     let last_failure = || collector.first_failure();
-    let surveyed = Source { name, dataset: source, files, last_failure: &last_failure };
+    let mut read_base = |path: &Path, selection: &Selection| read_base(path, selection, &collector);
+    let surveyed =
+        Source { name, dataset: source, files, last_failure: &last_failure, read_base: &mut read_base };
     let mut marking = Marking::new(request, surveyed, threads())?;
     drop(geometry_only);
     let foreign = ForeignMembers { of: &foreign_members, column: native_column };
     marking.search_traces(request, source, &foreign, &last_failure)?;
     Ok(marking)
+}
+
+/// Reads the reference of an earlier edition; failures go to this collector.
+fn read_base(path: &Path, selection: &Selection, collector: &Collector) -> meshmark_dataset::Result<Survey> {
+    let unread = |reason: String| meshmark_dataset::Error::BaseReferenceUnread { path: path.into(), reason };
+    let source =
+        OwnedSource::open(&path.to_string_lossy(), false).map_err(|error| unread(error.to_string()))?;
+    let dataset = source.dataset();
+    if dataset.is_meshmark() {
+        return Err(unread("it is a marked view".into()));
+    }
+    collector.clear();
+    survey(&dataset, selection)
 }
 
 /// Gives a marking to the shim, or reports why there is none.

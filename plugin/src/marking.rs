@@ -7,25 +7,22 @@ use crate::{
 };
 use gdal::Dataset;
 use meshmark_core::{
-    agreement::Evidence,
     carrier::Carrier,
-    deformation::Prediction,
     demodulation,
     embedding::{self, Marked},
-    estimation::Estimates,
-    fingerprint::{self, recipient_signs},
+    fingerprint::{self, FingerprintEmbedding},
+    fingerprint_record::{BaseEntry, PartEntry},
     key::{SecretKey, read_text},
     map::Map,
     options::{Options, Spelling, Subject},
-    part::PartDigest,
     patches::Patches,
     recorded::Recorded,
 };
 use meshmark_dataset::{
-    LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool, damage_warning,
+    Bases, LabelFields, MOST_VERTICES, Selection, Survey, ThreadPool, damage_warning,
     decimals::Digits,
     exposure,
-    marking::{self, Moves, Unmarked},
+    marking::{self, Lineage, Moves, Unmarked},
     same_file, survey,
     traces::{self, ForeignMembers},
 };
@@ -76,6 +73,10 @@ impl MarkingRequest {
                 return Err(Error::RecordIsOther { path: record.clone(), what: "key" });
             }
         }
+        let of_bases = [("BASE", &options.bases), ("BASE_REFERENCE", &options.base_references)];
+        for (option, paths) in of_bases {
+            output::check_is_not_base(option, paths.as_deref().unwrap_or_default())?;
+        }
         Ok(MarkingRequest { options, subject, key, key_path, exposed })
     }
 
@@ -89,20 +90,31 @@ impl MarkingRequest {
         }
     }
 
-    /// Marks a map.
-    fn embed(&self, map: &Map) -> meshmark_core::Result<Marked> {
+    /// Marks a map on its bases; returns the parts of a fingerprint, too.
+    fn embed(&self, map: Map, bases: &Bases) -> meshmark_core::Result<(Marked, Vec<PartEntry>)> {
         let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = self;
         match (coefficients, subject) {
             (Some(coefficients), Subject::Recipient(recipient)) => {
-                fingerprint::embed(map, key, recipient, *coefficients, parameters)
+                let series = bases.series(map, parameters)?;
+                fingerprint::embed(&series, key, recipient, *coefficients)
             }
-            _ => embedding::embed(map, key, &subject.carried(key), parameters),
+            _ => Ok((embedding::embed(&map, key, &subject.carried(key), parameters)?, Vec::new())),
         }
     }
 
     /// Returns the path of the record.
     pub fn record_path(&self) -> Option<&Path> {
         self.options.record_path.as_deref().map(Path::new)
+    }
+
+    /// Returns the option that names this file as a base or the reference of one.
+    pub fn base_at(&self, path: &Path) -> Option<&'static str> {
+        let Options { bases, base_references, .. } = &self.options;
+        let names = |paths: &Option<Vec<String>>| {
+            paths.iter().flatten().any(|named| same_file(Path::new(named), path))
+        };
+        let of_option = [("BASE", bases), ("BASE_REFERENCE", base_references)];
+        of_option.into_iter().find(|(_, paths)| names(paths)).map(|(option, _)| option)
     }
 
     /// Returns the path of the key file.
@@ -137,6 +149,8 @@ pub struct Source<'a> {
     pub files: SourceFiles,
     /// The function for [`Selection::last_failure`].
     pub last_failure: &'a dyn Fn() -> Option<String>,
+    /// Reads the reference of an earlier edition.
+    pub read_base: &'a mut dyn FnMut(&Path, &Selection) -> meshmark_dataset::Result<Survey>,
 }
 
 /// A marked dataset.
@@ -144,6 +158,7 @@ pub struct Marking {
     /// The name of the source for messages.
     pub name: String,
     map: Survey,
+    bases: Bases,
     moved: Vec<[f64; 2]>,
     layers: Option<Vec<String>>,
     files: SourceFiles,
@@ -164,8 +179,17 @@ impl Marking {
         let on_ground = map.map(&options.parameters)?;
         marking::check_extent(&on_ground, &options.parameters)?;
         marking::check_scale(&on_ground, map.crs.as_ref())?;
+        let mut read = |path: &Path, entry: &BaseEntry| {
+            let selection = Selection { geometries: false, ..selection(options, source.last_failure) };
+            let (layers, srs) = (entry.layers.as_deref(), entry.srs.as_deref());
+            match (source.read_base)(path, &Selection { layers, srs, ..selection }) {
+                Err(error) if error.is_of_other_layers() => Ok(None),
+                read => read.map(Some),
+            }
+        };
+        let bases = Bases::of_options(options, &request.key, &map, &mut read)?;
         let pool = pool(threads)?;
-        let marked = pool.install(|| request.embed(&on_ground))?;
+        let (marked, parts) = pool.install(|| request.embed(on_ground, &bases))?;
         let parameters = &options.parameters;
         let distortion = map.geometries.as_ref().map(|geometries| {
             pool.install(|| Unmarked::new(geometries, &on_ground).distortion(&marked, parameters))
@@ -175,7 +199,8 @@ impl Marking {
         let damage = damage_warning(parameters, &marked.angles, areas, spelling);
         let record = distortion.map(|distortion| {
             let reference = marking::reference(&map, marked.patches);
-            marking::recorded(options, &request.subject, &request.key, reference, distortion)
+            let lineage = Lineage { parts, bases: bases.entries().to_vec() };
+            marking::recorded(options, &request.subject, &request.key, (reference, lineage), distortion)
         });
         map.geometries = None;
         let message = options.coefficients.is_none().then(|| request.subject.carried(&request.key));
@@ -184,6 +209,7 @@ impl Marking {
         Ok(Marking {
             name: source.name,
             map,
+            bases,
             moved: marked.coords,
             record,
             layers: options.layers.clone(),
@@ -228,24 +254,23 @@ impl Marking {
     ) -> Result<()> {
         let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = request;
         let map = self.map.map(parameters)?;
-        let pairs = map.vertices.coords().iter().zip(found);
-        let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();
         let pool = pool(threads)?;
-        let patches = || Patches::new(&map, parameters);
         if let (Some(coefficients), Subject::Recipient(recipient)) = (*coefficients, subject) {
-            let noise = Prediction::of_noise(READ_BACK_NOISE_M, observed.len());
-            let estimates = pool.install(|| {
-                Estimates::new(&patches()?, &observed, coefficients, parameters, &noise, &|_| ())
+            let bases = &self.bases;
+            let score = pool.install(|| {
+                let series = bases.series(map, parameters)?;
+                let embedding = FingerprintEmbedding::new(&series, key, coefficients)?;
+                embedding.score(&embedding.fingerprint(recipient), found, READ_BACK_NOISE_M)
             })?;
-            let signs = recipient_signs(key, &PartDigest::of(map.vertices), recipient);
-            let score = Evidence::of_recipients(&estimates).agreement(&signs).score;
             return fingerprint::check_score(score)
                 .map_err(|_| Error::FingerprintUnreadable { score, digits });
         }
+        let pairs = map.vertices.coords().iter().zip(found);
+        let observed: Vec<_> = pairs.map(|(a, b)| Some(map.ground.metres_between(*a, *b))).collect();
         let message = subject.carried(key);
         let demodulated = pool.install(|| {
-            let carrier = Carrier::new(key);
-            demodulation::paper(&patches()?, &carrier, &observed, message.len(), parameters, &|_| ())
+            let (patches, carrier) = (Patches::new(&map, parameters)?, Carrier::new(key));
+            demodulation::paper(&patches, &carrier, &observed, message.len(), parameters, &|_| ())
         })?;
         match demodulated.message().errors(&message) {
             0 => Ok(()),

@@ -32,6 +32,15 @@ pub fn check_is_not_record(record: &str) -> Result<()> {
     }
 }
 
+/// Fails when this process is an ogr2ogr whose target is a base or its reference, which `option` names.
+pub fn check_is_not_base(option: &'static str, paths: &[String]) -> Result<()> {
+    let is_base = |path: &Path| paths.iter().any(|base| same_place(path, Path::new(base)));
+    match target(&arguments(), is_base) {
+        Some(_) => Err(Error::SameFile { option, other: "the output" }),
+        None => Ok(()),
+    }
+}
+
 fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }

@@ -90,6 +90,9 @@ impl Target {
         if same_file(&self.path, request.key_path()) {
             return Err(Error::SameFile { option: "KEY", other: "the target" });
         }
+        if let Some(option) = request.base_at(&self.path) {
+            return Err(Error::SameFile { option, other: "the target" });
+        }
         let record = request.record_path().map(place).transpose()?;
         if let Some(record) = &record {
             if *record == self.path {

@@ -51,7 +51,7 @@ pub fn study(product: &Product, map: &Path, sizes: &[usize], seed: u64) -> Resul
             (0..members).map(|n| Map::read(&copies[&recipient(n)])).collect::<Result<_>>()?;
         for (mixture, mixture_name) in Mixture::ALL {
             let suspect = path("suspect.gpkg");
-            mixture.of(&mixed, seed)?.write(&suspect)?;
+            mixture.mix(&mixed, seed)?.write(&suspect)?;
             let mut verify = product.meshmark();
             verify.args(["verify", "--json", "--key"]).arg(&key).arg("--reference").arg(map);
             verify.arg("--records").arg(&folder_of_copies);

@@ -113,10 +113,11 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     let request = Request {
         key: key.clone(),
         reference: reference.into(),
-        suspect: PrivateCopy::of("suspect", suspect)?,
+        suspect: PrivateCopy::make("suspect", suspect)?,
         record: None,
         subject: None,
         sought: Sought::Message { bits: 128 },
+        lineage: Default::default(),
         tried: 1,
         parameters: Parameters { precision_crs_units: Some(PRECISION_M), ..Parameters::default() },
         layers: None,
@@ -132,7 +133,7 @@ fn examine(key: &SecretKey, reference: &Path, suspect: &Path) -> Result<Demodula
     };
     let mut progress = Progress::default();
     let map = verify::read_reference(&request, &mut progress)?.or_fail()?;
-    match verify::examine(&request, &map, &mut progress)?.or_fail()?.found? {
+    match verify::examine(&request, (&map, &Default::default()), &mut progress)?.or_fail()?.found? {
         Found::Message(evidence) => Ok(evidence.demodulation),
         Found::Fingerprint(_) => unreachable!("a message is sought"),
     }

@@ -1,8 +1,10 @@
 //! The errors that end a command early. Every message names the input and the remedy.
 
 use crate::{
+    deposit::DepositFault,
     exit_code::ExitCode,
     inputs::{gdal_failures::GdalFailure, unsuitable::Unsuitable},
+    time_stamp::StampFault,
 };
 use gdal::errors::GdalError;
 use meshmark_core::{counted, options::Spelling};
@@ -31,6 +33,36 @@ pub enum Error {
     Malformed { path: PathBuf, source: meshmark_core::Error },
     #[error("the {what} {} cannot be read: {source}", path.display())]
     TextUnread { what: &'static str, path: PathBuf, source: io::Error },
+    #[error("the passphrase does not open {}: give the one that it was made with", path.display())]
+    WrongPassphrase { path: PathBuf },
+    #[error("the passphrase is empty: give one, on the first line of the file if it is in one")]
+    NoPassphrase,
+    #[error("the passphrase was not the same again: start anew")]
+    OtherPassphrase,
+    #[error(
+        "there is no terminal to ask for the passphrase ({source}): give it in a file, by --passphrase-file"
+    )]
+    NoTerminal { source: io::Error },
+    #[error("the key cannot be protected by a passphrase ({reason}): protect it with age, as age -p -a does")]
+    Unprotected { reason: String },
+    #[error(
+        "the case file {} is not understood ({reason}): write TOML with the texts number, examiner and date, and a list of \
+         texts, custody",
+        path.display()
+    )]
+    CaseFile { path: PathBuf, reason: String },
+    #[error("the record {}: {source}", path.display())]
+    OfRecord { path: PathBuf, source: Box<Error> },
+    #[error("{} is no signing key: give the file that `meshmark keygen` wrote, which ends in .signing.pem", path.display())]
+    NoSigningKey { path: PathBuf },
+    #[error("{} is no public key: give the file that `meshmark keygen` wrote, which ends in .public.pem", path.display())]
+    NoPublicKey { path: PathBuf },
+    #[error(
+        "the reference {} is no local file, whose digest could be deposited: export it to one with ogr2ogr, and deposit \
+         that",
+        path.display()
+    )]
+    NoFileToDeposit { path: PathBuf },
     #[error("the folder {} cannot be read: {source}", path.display())]
     FolderUnread { path: PathBuf, source: io::Error },
     #[error("{flag} contradicts the record: leave one of them out")]
@@ -49,6 +81,10 @@ pub enum Error {
         folder.display()
     )]
     NoRecord { folder: PathBuf },
+    #[error("the folder {} has no record (*.json): give the folder the records were written to", folder.display())]
+    NothingListed { folder: PathBuf },
+    #[error("--time-stamp-request has nothing to answer it: give the response to it with --time-stamp")]
+    NoAnswer,
     #[error(
         "the reference has {} and the marked map {marked}: compare a map with the copy that was marked from it, before \
          anything is removed",
@@ -68,8 +104,8 @@ pub enum Error {
     OtherVertices { layer: String, fid: String, other: String },
     #[error("the list of recipients {} {reason}", path.display())]
     Recipients { path: PathBuf, reason: String },
-    #[error("the report {} {reason}", path.display())]
-    ReportName { path: PathBuf, reason: String },
+    #[error("the {what} {} {reason}", path.display())]
+    OutputName { what: &'static str, path: PathBuf, reason: String },
     #[error("{} exists{remedy}", path.display())]
     Exists { path: PathBuf, remedy: &'static str },
     #[error("{} cannot be written: its folder does not exist", path.display())]
@@ -98,6 +134,12 @@ pub enum Error {
     )]
     OtherParts { parts: usize },
     #[error(
+        "the {} of the record are not those of its reference and its bases: give the files of all editions, unchanged, or \
+         verify with the version of meshmark that wrote it",
+        counted(*parts, "part")
+    )]
+    OtherPartsOfBases { parts: usize },
+    #[error(
         "the demodulator of the paper reads messages, and the mark is the fingerprint of a recipient: leave --demodulator \
          out"
     )]
@@ -114,6 +156,17 @@ pub enum Error {
         "the record was made from none of the {references} references given: give the file that was marked, unchanged"
     )]
     NoReferenceOfRecord { references: usize },
+    #[error(
+        "the {what} is not in the deposit: it was chosen or changed after the deposit, or belongs to another one; give the \
+         files that were deposited, unchanged"
+    )]
+    NotDeposited { what: String },
+    #[error("the time stamp {} {source}", path.display())]
+    TimeStamp { path: PathBuf, source: StampFault },
+    #[error("{} holds no certificate: give a bundle of the authorities that you trust, PEM", path.display())]
+    NoAuthorities { path: PathBuf },
+    #[error("the deposit {} {source}", path.display())]
+    Deposit { path: PathBuf, source: DepositFault },
     #[error(
         "there are several references, and no record to choose one by: give --record or --records, or one --reference"
     )]
@@ -180,7 +233,7 @@ pub enum Error {
 
     // --- outputs that cannot be written ---
     #[error("{what} cannot be written: {source}{remedy}")]
-    Unwritten { what: String, source: Box<Cause>, remedy: &'static str },
+    Unwritten { what: String, source: Box<Cause>, remedy: String },
     #[error("the answer cannot be printed: {source}")]
     Unprinted { source: io::Error },
     #[error("the output folder {} cannot be made ({source}): name one that can be", path.display())]
@@ -253,7 +306,7 @@ pub enum Cause {
 impl Error {
     /// Creates the error of an output for which there is no remedy but another try.
     pub fn unwritten(what: impl ToString, source: impl Into<Cause>) -> Self {
-        Error::Unwritten { what: what.to_string(), source: Box::new(source.into()), remedy: "" }
+        Error::Unwritten { what: what.to_string(), source: Box::new(source.into()), remedy: String::new() }
     }
 
     /// Returns whether the layers and the CRS that a request names allow no mark on a map.
@@ -284,9 +337,12 @@ impl Error {
             Dataset(MapError::File { .. } | MapError::NotKept { .. } | MapError::Gdal(_)) => {
                 ExitCode::Unwritable
             }
-            OtherKey { .. }
+            Dataset(error) if error.is_of_other_base() => ExitCode::DoesNotBelong,
+            NotDeposited { .. }
+            | OtherKey { .. }
             | OtherCommitment { .. }
             | OtherParts { .. }
+            | OtherPartsOfBases { .. }
             | OtherMessage
             | OtherReference { .. }
             | NoReferenceOfRecord { .. } => ExitCode::DoesNotBelong,
@@ -312,7 +368,9 @@ impl Error {
             | Killed { .. }
             | EarlyEnd { .. }
             | NotConfined { .. } => ExitCode::Stopped,
-            Copy { source, .. } | Stopped { source, .. } => source.exit_code(),
+            TimeStamp { source, .. } if !source.is_malformed() => ExitCode::DoesNotBelong,
+            Deposit { source, .. } if !source.is_malformed() => ExitCode::DoesNotBelong,
+            Copy { source, .. } | Stopped { source, .. } | OfRecord { source, .. } => source.exit_code(),
             _ => ExitCode::Usage,
         }
     }

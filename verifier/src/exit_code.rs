@@ -11,7 +11,7 @@ pub enum ExitCode {
     Usage = 2,
     /// The suspect does not allow an answer.
     Inconclusive = 3,
-    /// The record does not belong to this reference or this key.
+    /// The record or the deposit does not belong to this reference or this key.
     DoesNotBelong = 4,
     /// An input cannot be read.
     Unreadable = 5,
@@ -44,7 +44,7 @@ impl ExitCode {
             ExitCode::NoMatch => "no match",
             ExitCode::Usage => "usage",
             ExitCode::Inconclusive => "inconclusive",
-            ExitCode::DoesNotBelong => "the record does not belong to this reference or key",
+            ExitCode::DoesNotBelong => "the record or the deposit does not belong to this reference or key",
             ExitCode::Unreadable => "unreadable input",
             ExitCode::TooLarge => "too large",
             ExitCode::Unwritable => "an output cannot be written",

@@ -122,6 +122,31 @@ fn the_record_that_the_driver_wrote_is_valid() {
 }
 
 #[test]
+fn the_statement_of_a_deposit_is_valid_and_its_schema_says_what_is_read() {
+    let statement = common::deposits::Vendor::new().statement();
+    assert_valid("deposit", &statement);
+    let objects = [
+        "",
+        "/subject/0",
+        "/subject/0/digest",
+        "/predicate",
+        "/predicate/references/0",
+        "/predicate/marks/0",
+        "/predicate/records",
+        "/predicate/recipients",
+    ];
+    assert_closed("deposit", &statement, &objects);
+    let changes = [
+        ("/predicateType", json!("urn:meshmark:deposit:2")),
+        ("/subject", json!([])),
+        ("/predicate/key_commitment", json!("434471506306423b")),
+        ("/predicate/references/0/vertices", json!(0)),
+        ("/predicate/records/merkle_root", json!("F".repeat(64))),
+    ];
+    assert_refused("deposit", &statement, &changes);
+}
+
+#[test]
 fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
     let text = fs::read_to_string(root().join("fixtures/vectors/fingerprint/record.json")).unwrap();
     let record: Value = serde_json::from_str(&text).unwrap();
@@ -135,8 +160,20 @@ fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
     signed["signature"] = json!({ "ed25519": "00" });
     assert_valid("record-2", &signed);
     assert!(FingerprintRecord::from_json(&signed.to_string()).is_ok());
+    let mut record = record;
+    let first = json!({ "vertices_sha256": "ab".repeat(32), "layers": null, "srs": null, "bases": [] });
+    let mut second = first.clone();
+    second["vertices_sha256"] = json!("cd".repeat(32));
+    second["bases"] = json!(["ab".repeat(32)]);
+    second["layers"] = json!(["roads"]);
+    record["bases"] = json!([first, second]);
+    assert_valid("record-2", &record);
+    assert!(FingerprintRecord::from_json(&record.to_string()).is_ok());
+    assert_closed("record-2", &record, &["/bases/1"]);
     let changes = [
         ("/meshmark_record", json!(1)),
+        ("/bases/0/vertices_sha256", json!("00")),
+        ("/bases/1/bases", json!(["AB"])),
         ("/recipient", json!(" ")),
         ("/key_commitment", json!("434471506306423b")),
         ("/mark/amplitude_m", json!(0)),

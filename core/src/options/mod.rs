@@ -19,7 +19,7 @@ pub use table::{
     CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
 };
 
-use crate::{Result, message::Message, signs::COEFFICIENTS};
+use crate::{Error, Result, message::Message, signs::COEFFICIENTS};
 use values::Values;
 
 /// All options of one marking, parsed.
@@ -43,6 +43,10 @@ pub struct Options {
     pub srs: Option<String>,
     /// Path of the record to write.
     pub record_path: Option<String>,
+    /// Paths of the records of earlier editions, or of folders of such records.
+    pub bases: Option<Vec<String>>,
+    /// Their references, and those of their own bases, in any order.
+    pub base_references: Option<Vec<String>>,
 }
 
 impl Options {
@@ -67,6 +71,10 @@ impl Options {
         };
         let code = values.choice("CODE", Code::from_name)?.unwrap_or(Code::default_for(bits));
         code.channel_bits(bits)?;
+        let bases = values.list("BASE")?;
+        if bases.is_some() && subject.is_some() && !is_fingerprint {
+            return Err(Error::BaseOfMessage);
+        }
         Ok(Options {
             key_path: values.text("KEY")?,
             subject,
@@ -86,6 +94,8 @@ impl Options {
             refuses_traces: values.choice("ATTRIBUTES", refuses)?.expect("has a default"),
             srs: values.text("SRS")?,
             record_path: values.text("RECORD")?,
+            bases,
+            base_references: values.list("BASE_REFERENCE")?,
         })
     }
 
@@ -122,6 +132,8 @@ impl Options {
             "ATTRIBUTES" => Some(if self.refuses_traces { "REFUSE" } else { "WARN" }.into()),
             "SRS" => self.srs.clone(),
             "RECORD" => self.record_path.clone(),
+            "BASE" => self.bases.as_ref().map(join_list),
+            "BASE_REFERENCE" => self.base_references.as_ref().map(join_list),
             _ => panic!("{option} is no option"),
         }
     }
@@ -159,7 +171,6 @@ impl Default for Parameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Error;
 
     fn error(pairs: &[(&str, &str)]) -> String {
         Options::parse(pairs.iter().copied()).unwrap_err().to_string()
@@ -236,8 +247,14 @@ mod tests {
             ("SRS", "EPSG:3067"),
             ("RECORD", "acme.json"),
         ];
+        let of_base = [("BASE", r#"may.json,"June, July""#), ("BASE_REFERENCE", "may.gpkg")];
+        let of_message = ["CODE", "CHIP_RATE"];
         for subject in [("RECIPIENT", " ACME, \"GmbH\""), ("MESSAGE", "C0ffee")] {
-            let given = [&all[..], &[subject]].concat();
+            let mut given = [&all[..], &of_base, &[subject]].concat();
+            match subject.0 {
+                "RECIPIENT" => given.retain(|(name, _)| !of_message.contains(name)),
+                _ => given.retain(|(name, _)| *name != "BASE"),
+            }
             for options in [marking(&given), marking(&[]), marking(&[subject])] {
                 let texts = OPTIONS.iter().filter_map(|o| Some((o.name, options.text_of(o.name)?)));
                 let texts: Vec<_> = texts.collect();
@@ -245,7 +262,7 @@ mod tests {
                 assert_eq!(Options::parse(pairs).unwrap(), options, "{texts:?}");
             }
             let printed = OPTIONS.iter().filter(|o| marking(&given).text_of(o.name).is_some()).count();
-            assert_eq!(printed, OPTIONS.len() - 1, "all but the other subject");
+            assert_eq!(printed, given.len(), "all that were given");
         }
     }
 
@@ -269,6 +286,8 @@ mod tests {
         assert!(error(&[("RECIPIENT", "a"), ("MESSAGE", "00")]).contains("exactly one"));
         assert!(error(&[("MESSAGE", "xyz")]).contains("hexadecimal"));
         assert!(error(&[("LAYERS", "a,,b")]).contains("empty name"));
+        let of_message = error(&[("BASE", "a.json"), ("MESSAGE", "00")]);
+        assert!(of_message.contains("BASE is for fingerprints"), "{of_message}");
         assert!(
             error(&[("LAYERS", r#""a,b"#)]).contains(r#"LAYERS="a,b has a double quote that is not closed"#)
         );

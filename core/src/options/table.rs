@@ -190,6 +190,21 @@ pub const OPTIONS: &[OptionSpec] = &[
         false,
         "Record file to write, which verification needs with the key and the reference",
     ),
+    row(
+        "BASE",
+        Kind::Text,
+        None,
+        false,
+        "Comma-separated records of earlier editions, or folders of them: vertices that these had move as there; a \
+         fingerprint alone can rest on them",
+    ),
+    row(
+        "BASE_REFERENCE",
+        Kind::Text,
+        None,
+        false,
+        "Comma-separated references of those editions and of the editions that they rest on, in any order",
+    ),
 ];
 
 /// The further options of a driver that writes, in the order of the docs.

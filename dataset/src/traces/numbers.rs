@@ -1,9 +1,23 @@
 //! The numbers in texts and bytes, whatever the format: WKT, GeoJSON, GML, lists; well-known binary
-//! geometries, their hexadecimal digits, the blobs of GeoPackage and SpatiaLite.
+//! geometries, their hexadecimal digits or base64, the blobs of GeoPackage and SpatiaLite.
+
+use base64::{
+    Engine, alphabet,
+    engine::{GeneralPurpose, GeneralPurposeConfig},
+};
 
 /// This many hexadecimal digits have a coordinate pair.
 const LEAST_DIGITS: usize = 32;
 const PAIR_BYTES: usize = 16;
+/// This many characters of base64 hold a coordinate pair (RFC 4648).
+const LEAST_CHARACTERS: usize = 22;
+/// Padding stands apart from the characters, and the last of them may have bits to spare.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_allow_trailing_bits(true)
+        .with_decode_padding_mode(base64::engine::DecodePaddingMode::RequireNone),
+);
 
 /// Returns the numbers of a text in their order.
 pub(super) fn of_text(text: &str) -> Vec<f64> {
@@ -67,9 +81,27 @@ pub(super) fn bytes_of_digits(text: &str) -> impl Iterator<Item = Vec<u8>> {
     runs.filter(|run| run.len() >= LEAST_DIGITS).map(decoded)
 }
 
+/// Returns the bytes of every run of base64, in either alphabet (RFC 4648), that is long enough for a
+/// coordinate pair.
+pub(super) fn bytes_of_base64(text: &str) -> impl Iterator<Item = Vec<u8>> {
+    let is_of_base64 = |byte: &u8| byte.is_ascii_alphanumeric() || b"+/-_".contains(byte);
+    let standard = |byte: &u8| match byte {
+        b'-' => b'+',
+        b'_' => b'/',
+        other => *other,
+    };
+    let runs = text.as_bytes().split(move |byte| !is_of_base64(byte));
+    runs.filter(|run| run.len() >= LEAST_CHARACTERS).filter_map(move |run| {
+        // One character alone is no byte.
+        let whole = if run.len() % 4 == 1 { &run[..run.len() - 1] } else { run };
+        BASE64.decode(whole.iter().map(standard).collect::<Vec<u8>>()).ok()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use base64::engine::general_purpose;
 
     #[test]
     fn numbers_are_found_in_any_notation() {
@@ -103,6 +135,10 @@ mod tests {
             assert!(has(&bytes) && !has(&bytes[..20]));
             assert!(bytes_of_digits(&text).any(|bytes| has(&bytes)), "{text}");
             assert!(bytes_of_digits(&text.to_uppercase()).any(|bytes| has(&bytes)), "{text}");
+            for engine in [general_purpose::STANDARD, general_purpose::URL_SAFE_NO_PAD] {
+                let text = format!("data:;base64,{}", engine.encode(&bytes));
+                assert!(bytes_of_base64(&text).any(|bytes| has(&bytes)), "{text}");
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The search for traces in a dataset.
 
 use super::{
-    numbers::{bytes_of_digits, of_text, of_value, pairs_of_bytes},
+    numbers::{bytes_of_base64, bytes_of_digits, of_text, of_value, pairs_of_bytes},
     trace::{Kind, Trace},
     vertices::{Tally, Vertices},
 };
@@ -222,10 +222,10 @@ impl Field {
     }
 }
 
-/// Counts the places in a text, also in one of hexadecimal digits.
+/// Counts the places in a text, also in one of hexadecimal digits or base64.
 fn count_text(text: &str, vertices: &Vertices, tally: &mut Tally) {
     count_list(&of_text(text), vertices, tally);
-    for bytes in bytes_of_digits(text) {
+    for bytes in bytes_of_digits(text).chain(bytes_of_base64(text)) {
         pairs_of_bytes(&bytes, |pair| {
             if vertices.may_hold(pair[0]) {
                 vertices.count(pair, tally);

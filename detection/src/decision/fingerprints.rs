@@ -66,9 +66,9 @@ impl Grounds {
         Grounds { significance, is_mixed, may_have_key, missed_log10 }
     }
 
-    /// Returns whether copies of several recipients may be mixed, so that bets on the shares of those
-    /// who are not named may show more: the signs are weak, or nobody is named.
-    pub fn ask_for_bets(&self, standings: &[Standing]) -> bool {
+    /// Returns whether copies of several recipients may be mixed, so that a look for the shares of
+    /// those who are not named may show more: the signs are weak, or nobody is named.
+    pub fn ask_for_shares(&self, standings: &[Standing]) -> bool {
         self.is_mixed || self.may_have_key && standings.iter().all(|standing| !standing.is_named)
     }
 
@@ -126,7 +126,7 @@ mod tests {
         estimation::Estimates,
         fingerprint::{Fingerprint, pilots, recipient_signs},
         key::SecretKey,
-        part::PartDigest,
+        part::Parts,
         signs::{Sequence, Signs},
         vertices::VertexTable,
     };
@@ -138,8 +138,8 @@ mod tests {
         SecretKey::from_bytes([3; 32])
     }
 
-    fn part() -> PartDigest {
-        PartDigest::of(&VertexTable::new(vec![[0.0, 1.0]]).unwrap())
+    fn part() -> Parts {
+        Parts::whole(&VertexTable::new(vec![[0.0, 1.0]]).unwrap())
     }
 
     fn signs(name: &str) -> Sequence {

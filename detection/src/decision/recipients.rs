@@ -13,6 +13,10 @@
 //! signs of an innocent candidate are independent of it, too. Round m multiplies p by m (m + 1):
 //! the sum of 1 / (m (m + 1)) is 1, so that the significance is that of all rounds together.
 //!
+//! *Beside others.* In a mixture of many copies nobody may be certain at first. Each candidate is
+//! then scored on what remains without all *other* candidates that are suspected
+//! ([`Evidence::scores_beside_others`]), which is independent of its own signs just as well.
+//!
 //! *Whose share?* In a mosaic everybody's share is weak in the sums of all signs, and exact where it
 //! is. The wealth of a gambler who bets on the signs is the evidence then ([`Standing::bet`]).
 
@@ -27,7 +31,11 @@ use rayon::prelude::*;
 /// Bets, and each of three scores without pilots, have a hundredth of the error that the first scores
 /// have: their p-values are multiplied by 100, and all together err by at most 1.04 times the
 /// significance.
-pub(crate) const FURTHER_TESTS_LOG10: f64 = 2.0;
+const FURTHER_TESTS_LOG10: f64 = 2.0;
+
+/// At most so many innocent candidates are suspected, and at most this share of all.
+const SUSPECTED_BY_CHANCE: f64 = 32.0;
+const MOST_SUSPECTED: f64 = 0.05;
 
 /// More rounds name nobody else: every round needs stronger evidence.
 const MOST_ROUNDS: usize = 20;
@@ -41,6 +49,12 @@ pub fn p_log10(score: f64) -> f64 {
 /// Returns the least score that a recipient, one of the `tried`, needs to be named.
 pub fn needed_score(tried: usize, significance: f64) -> f64 {
     survival::signs_quantile(significance / (tried as f64 * 10f64.powf(rounds_log10(1, tried))))
+}
+
+/// Returns the score from which on a candidate is suspected beside others: as many as this of the
+/// `tried` have it by chance.
+pub(crate) fn suspected_score(tried: usize) -> f64 {
+    survival::signs_quantile((SUSPECTED_BY_CHANCE / tried as f64).min(MOST_SUSPECTED))
 }
 
 /// Returns whether a mark of the key is detected, given the score of its pilots.
@@ -71,7 +85,7 @@ pub struct Standing {
 pub fn name_recipients(evidence: &Evidence, candidates: &[Sequence], significance: f64) -> Vec<Standing> {
     let tried = candidates.len();
     let linear = |named: &[usize], _: &[usize]| {
-        Ok(evidence.without(&named.iter().map(|&k| candidates[k]).collect::<Vec<_>>()))
+        Ok(evidence.without(&named.iter().map(|&k| candidates[k].clone()).collect::<Vec<_>>()))
     };
     name_in_rounds(evidence, candidates, (tried, significance), linear).expect("nothing fails")
 }
@@ -124,27 +138,30 @@ pub fn name_in_rounds(
 }
 
 impl Standing {
-    /// Takes the standing of the same candidate in further evidence, where it is the stronger one.
-    pub fn take(&mut self, further: Standing, significance: f64) {
-        let p_value_log10 = further.p_value_log10 + FURTHER_TESTS_LOG10;
-        if p_value_log10 < self.p_value_log10 {
-            let p_alone_log10 = (further.p_alone_log10 + FURTHER_TESTS_LOG10).min(0.0);
-            let is_named = p_value_log10 < significance.log10();
-            let Standing { score, round, .. } = further;
-            *self = Standing { score, round, p_alone_log10, p_value_log10, is_named, ..*self };
+    /// Takes the score in further evidence where it is the stronger one. One of the `tried`, whose
+    /// significance together is this one.
+    pub fn take(&mut self, score: f64, tried: (usize, f64)) {
+        if self.improve((p_log10(score) + FURTHER_TESTS_LOG10).min(0.0), tried) {
+            *self = Standing { score, is_of_share: false, ..*self };
         }
     }
 
-    /// Takes the wealth of a gambler in a round of bets, log₁₀, for evidence where it is stronger than
-    /// the score. One of the `tried`, whose significance together is this one.
-    pub fn bet(&mut self, wealth_log10: f64, round: usize, (tried, significance): (usize, f64)) {
-        let p_alone_log10 = (FURTHER_TESTS_LOG10 - wealth_log10).min(0.0);
-        let factor_log10 = (tried as f64).log10() + rounds_log10(round, tried);
-        let p_value_log10 = (p_alone_log10 + factor_log10).min(0.0);
-        if p_value_log10 < self.p_value_log10 {
-            let is_named = p_value_log10 < significance.log10();
-            *self = Standing { p_alone_log10, p_value_log10, is_of_share: true, is_named, ..*self };
+    /// Takes the wealth of a gambler, log₁₀, for evidence where it is stronger than the score.
+    pub fn bet(&mut self, wealth_log10: f64, tried: (usize, f64)) {
+        if self.improve((FURTHER_TESTS_LOG10 - wealth_log10).min(0.0), tried) {
+            self.is_of_share = true;
         }
+    }
+
+    /// Takes a p-value where it is smaller, and returns whether it is.
+    fn improve(&mut self, p_alone_log10: f64, (tried, significance): (usize, f64)) -> bool {
+        let p_value_log10 = (p_alone_log10 + (tried as f64).log10()).min(0.0);
+        let is_smaller = p_value_log10 < self.p_value_log10;
+        if is_smaller {
+            let is_named = p_value_log10 < significance.log10();
+            *self = Standing { p_alone_log10, p_value_log10, is_named, round: 1, ..*self };
+        }
+        is_smaller
     }
 }
 

@@ -88,7 +88,12 @@ pub const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0
 pub const OPPOSITE_CORNERS: [[f64; 2]; 2] = [CORNERS[0], CORNERS[2]];
 
 /// Returns these corners of the box of every feature.
-pub fn of(reference: &MapData, plane: &Plane, frame: Frame, corners: &[[f64; 2]]) -> Vec<FeaturePoint> {
+pub fn feature_points(
+    reference: &MapData,
+    plane: &Plane,
+    frame: Frame,
+    corners: &[[f64; 2]],
+) -> Vec<FeaturePoint> {
     let of_shells = |shells: Vec<u32>| {
         let places = places(reference, plane, &shells).into_iter().map(|place| frame.inward(place));
         let places: Vec<[f64; 2]> = places.collect();
@@ -134,7 +139,7 @@ mod tests {
         let diamond = vec![[0.0, 4.0], [5.0, 0.0], [11.0, 6.0], [6.0, 9.0], [0.0, 4.0]];
         let (map, indices) = MapData::from_chains(diamond, &[0], [ChainKind::Shell]).unwrap();
         let areas = Areas::new(&indices, &[0], [ChainKind::Shell], &[0]);
-        let points = of(
+        let points = feature_points(
             &MapData { areas, ..map },
             &Plane::new(&Ground::METRES, [0.0; 2]),
             Frame::UPRIGHT,

@@ -8,7 +8,7 @@ use meshmark_core::{areas::Ring, map_data::MapData};
 const LEAST_AREA_M2: f64 = 0.01;
 
 /// Returns the centroid of every feature, holes and all parts included.
-pub fn of(reference: &MapData, plane: &Plane) -> Vec<FeaturePoint> {
+pub fn feature_points(reference: &MapData, plane: &Plane) -> Vec<FeaturePoint> {
     let centroid = |rings: Vec<Ring>| {
         let rings: Vec<Outline> = rings.iter().map(|ring| Outline::new(ring, reference, plane)).collect();
         centroid(&rings)
@@ -105,7 +105,7 @@ mod tests {
         };
         let chains: Vec<u32> = [0, 1, 2, 3, 0, 4, 5, 6, 7, 4, 8, 9, 10, 8].map(index).to_vec();
         map.areas = Areas::new(&chains, &[0, 5, 10], [Shell, Hole, Shell], &[0]);
-        let mut points = of(&map, &Plane::new(&Ground::METRES, [0.0; 2]));
+        let mut points = feature_points(&map, &Plane::new(&Ground::METRES, [0.0; 2]));
         assert_eq!(points.len(), 1);
         let mut point = points.remove(0);
         // By the number of the place, not of the vertex.
@@ -166,6 +166,8 @@ mod tests {
     fn a_feature_without_an_area_has_no_centroid() {
         let flat = MapData::of_points(VertexTable::new(vec![[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).unwrap());
         let areas = Areas::new(&[0, 1, 2, 0], &[0], [ChainKind::Shell], &[0]);
-        assert!(of(&MapData { areas, ..flat }, &Plane::new(&Ground::METRES, [0.0; 2])).is_empty());
+        assert!(
+            feature_points(&MapData { areas, ..flat }, &Plane::new(&Ground::METRES, [0.0; 2])).is_empty()
+        );
     }
 }

@@ -53,7 +53,7 @@ pub fn shown(matched: &Matched) -> impl Iterator<Item = Features> {
 }
 
 fn of_kind(matched: &Matched, kind: Observations) -> Option<Features> {
-    let pair = Pair::of(matched);
+    let pair = Pair::new(matched);
     let (points, candidates) = pair.points(kind)?;
     let (reference, plane) = (matched.reference, pair.plane());
     let candidates: Vec<[f64; 2]> = (matched.moved.iter().zip(candidates))
@@ -87,12 +87,12 @@ pub fn maps_of_features(reference: &MapData, ground: &Ground, suspect: &MapData)
     let plane = pair.plane();
     let mut all = Vec::new();
     if pair.alone().is_some_and(|alone| is_most(&alone)) {
-        all.push(centroids::of(reference, &plane));
+        all.push(centroids::feature_points(reference, &plane));
     }
     if let Some((frame, _)) = pair.frame().filter(|(_, on_boxes)| is_most(on_boxes)) {
         // The suspect may have been turned after the boxes were drawn.
-        all.push(boxes::of(reference, &plane, frame, &boxes::CORNERS));
-        all.push(boxes::of(reference, &plane, Frame::UPRIGHT, &boxes::CORNERS));
+        all.push(boxes::feature_points(reference, &plane, frame, &boxes::CORNERS));
+        all.push(boxes::feature_points(reference, &plane, Frame::UPRIGHT, &boxes::CORNERS));
     }
     let map = |points: Vec<FeaturePoint>| {
         let vertices = VertexTable::new(points.iter().map(|point| plane.place(point.at_m)).collect())?;
@@ -104,7 +104,7 @@ pub fn maps_of_features(reference: &MapData, ground: &Ground, suspect: &MapData)
 /// Returns where the vertices of the suspect go when the vertices of the reference move, if they are
 /// points of features, CRS units. The nearest point of a feature takes each of them along.
 pub fn moved(matched: &Matched, kind: Observations, displacement_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let pair = Pair::of(matched);
+    let pair = Pair::new(matched);
     let plane = pair.plane();
     let Some((points, _)) = pair.points(kind) else { return matched.moved.clone() };
     let displaced = |FeaturePoint { shares, .. }: &FeaturePoint| {
@@ -133,7 +133,7 @@ struct Pair<'a> {
 }
 
 impl<'a> Pair<'a> {
-    fn of(matched: &'a Matched) -> Self {
+    fn new(matched: &'a Matched) -> Self {
         let Matched { reference, suspect, moved, .. } = matched;
         Pair { reference: reference.data, ground: &reference.ground, suspect, places: moved }
     }
@@ -144,11 +144,14 @@ impl<'a> Pair<'a> {
         match kind {
             Observations::Centroids => {
                 let alone = self.alone()?;
-                Some((centroids::of(self.reference, &self.plane()), alone))
+                Some((centroids::feature_points(self.reference, &self.plane()), alone))
             }
             Observations::Boxes => {
                 let (frame, on_boxes) = self.frame()?;
-                Some((boxes::of(self.reference, &self.plane(), frame, &boxes::OPPOSITE_CORNERS), on_boxes))
+                Some((
+                    boxes::feature_points(self.reference, &self.plane(), frame, &boxes::OPPOSITE_CORNERS),
+                    on_boxes,
+                ))
             }
             Observations::Vertices | Observations::Corners => None,
         }

@@ -41,7 +41,7 @@ impl Mixture {
     ///
     /// # Errors
     /// Fails without copies, and on copies of different maps.
-    pub fn of(self, copies: &[Map], seed: u64) -> Result<Map> {
+    pub fn mix(self, copies: &[Map], seed: u64) -> Result<Map> {
         let (first, others) = copies.split_first().ok_or("there is nothing to mix")?;
         let count = first.coords().count();
         if others.iter().any(|copy| copy.coords().count() != count) {
@@ -106,7 +106,7 @@ mod tests {
             (Mixture::Median, 1),
             (Mixture::MinorityExtreme, 8),
         ] {
-            let mixed = mixture.of(&copies, 1).unwrap();
+            let mixed = mixture.mix(&copies, 1).unwrap();
             assert_eq!(wkt(&mixed), [format!("LINESTRING (0 {y},10 {y})")], "{mixture:?}");
         }
     }
@@ -117,7 +117,7 @@ mod tests {
         let moved = translate(&map, [1.0, 0.0]);
         let shared = map.vertices().unwrap().len();
         for (mixture, _) in Mixture::ALL {
-            let mixed = mixture.of(&[map.clone(), moved.clone()], 1).unwrap();
+            let mixed = mixture.mix(&[map.clone(), moved.clone()], 1).unwrap();
             let shifts =
                 mixed.coords().zip(map.coords()).map(|(a, b)| ((a[0] - b[0]) * 100.0).round() as u32);
             let own = shifts.filter(|shift| *shift == 0).count() as f64 / map.coords().count() as f64;
@@ -129,15 +129,15 @@ mod tests {
                 assert_eq!(mixed.vertices().unwrap().len(), shared, "{mixture:?}");
             }
         }
-        let mosaic = Mixture::OfFeatures.of(&[map.clone(), moved], 1).unwrap();
+        let mosaic = Mixture::OfFeatures.mix(&[map.clone(), moved], 1).unwrap();
         let whole = mosaic.geometries().zip(map.geometries()).filter(|(a, b)| a == b).count() as f64;
         assert!((0.3..0.7).contains(&(whole / map.geometries().count() as f64)));
     }
 
     #[test]
     fn different_maps_are_refused() {
-        assert!(Mixture::Average.of(&[], 1).is_err());
+        assert!(Mixture::Average.mix(&[], 1).is_err());
         let others = [in_memory(&["POINT (1 1)"]), in_memory(&["LINESTRING (0 0,1 1)"])];
-        assert!(Mixture::Average.of(&others, 1).is_err());
+        assert!(Mixture::Average.mix(&others, 1).is_err());
     }
 }

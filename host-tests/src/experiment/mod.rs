@@ -259,7 +259,7 @@ impl Lab<'_> {
             Case::Collusion { copies } => {
                 let colluders = &sheet.copies[..*copies];
                 let maps = colluders.iter().map(|copy| Map::read(&copy.path)).collect::<Result<Vec<_>>>()?;
-                Mixture::Average.of(&maps, seed)?.write(suspect)?;
+                Mixture::Average.mix(&maps, seed)?.write(suspect)?;
                 let innocent = |i| self.question(sheet, &format!("innocent {i}"), false, None);
                 Ok(colluders.iter().map(guilty).chain((1..=INNOCENTS).map(innocent)).collect())
             }

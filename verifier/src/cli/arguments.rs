@@ -5,7 +5,7 @@ use clap::{
 };
 use meshmark_core::options::{OPTIONS, OptionSpec, Spelling};
 use meshmark_detection::{Demodulator, registration::Start};
-use meshmark_verifier::ExitCode;
+use meshmark_verifier::{ExitCode, inputs::passphrase::Passphrase};
 use std::path::PathBuf;
 
 const MARKING: &str = "Maps are marked by GDAL's ogr2ogr: ogr2ogr -f GPKG marked.gpkg MESHMARK:map.gpkg \
@@ -25,11 +25,20 @@ pub(super) const EXAMINE: &str = "examine";
 
 #[derive(Subcommand)]
 pub(super) enum Subcommands {
-    /// Make a secret key and write it to a new file that only you can read
-    Keygen {
-        /// The file to write; it must not exist
-        key_file: PathBuf,
-    },
+    /// Make a secret key, and a key pair that signs deposits, in new files
+    ///
+    /// The secret key goes to the file that you name, and the key pair beside it: for key.json
+    /// key.signing.pem, which only you can read, too, and key.public.pem, which is for everybody.
+    Keygen(KeygenArgs),
+    /// Fix key, references and records in a signed file, before copies are handed out
+    ///
+    /// Who keeps the deposit, or its time stamp, can show later that nobody chose or changed any of
+    /// them since. It discloses neither the key nor a recipient. With --verify the deposit is
+    /// verified, with its time stamp, and compared with the key, the references and the records that
+    /// are given. Nothing is sent: a command that sends the request for a time stamp is printed. Exit
+    /// codes: 0 written, or verified, 2 usage, 4 something is not in the deposit or not stamped, 5
+    /// unreadable input, 7 an output cannot be written.
+    Deposit(Box<DepositArgs>),
     /// Determine whether a suspect map carries a mark
     #[command(long_about = about_verify())]
     Verify(Box<VerifyArgs>),
@@ -55,6 +64,16 @@ pub(super) enum Subcommands {
     /// those that are there. Exit codes: 0 all copies are there, 2 usage, 5 unreadable map, 6 too
     /// large, 7 a copy cannot be written.
     Distribute(Box<DistributeArgs>),
+    /// List who received which copy, from the records of a folder
+    ///
+    /// The table is CSV: recipient, edition (SHA-256 of the vertices of the unmarked map), number of
+    /// earlier editions, record, copy beside the record, its SHA-256, whether it is the recorded one,
+    /// and the day on which it was last written. Exit codes: 0 listed, 2 usage, or no readable records,
+    /// 5 unreadable copy.
+    Records {
+        /// Folder of the records (*.json), such as the output of `meshmark distribute`
+        folder: PathBuf,
+    },
     /// Write man pages and shell completions, for packagers
     #[command(hide = true)]
     PackageFiles {
@@ -64,10 +83,97 @@ pub(super) enum Subcommands {
 }
 
 #[derive(Args)]
+pub(super) struct KeygenArgs {
+    /// The file to write; it must not exist
+    pub(super) key_file: PathBuf,
+    /// Make only the key pair, for a key file that exists
+    #[arg(long)]
+    pub(super) signing_key_only: bool,
+    /// Protect the secret key and the signing key by a passphrase, in the format of age; it is asked for
+    /// unless --passphrase-file has it
+    #[arg(long)]
+    pub(super) passphrase: bool,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
+}
+
+/// How protected keys are opened.
+#[derive(Args)]
+pub(super) struct OpeningFlags {
+    /// File whose first line is the passphrase of the key; without it, the terminal asks for one that is
+    /// needed
+    #[arg(long, value_name = "FILE")]
+    pub(super) passphrase_file: Option<PathBuf>,
+}
+
+impl KeygenArgs {
+    /// Returns whether the user asks for protection: a file with a passphrase has no other purpose.
+    pub(super) fn is_protected(&self) -> bool {
+        self.passphrase || self.opening.passphrase_file.is_some()
+    }
+}
+
+impl OpeningFlags {
+    /// Returns the passphrase, which is asked for when a protected key is read.
+    pub(super) fn passphrase(&self) -> Passphrase {
+        Passphrase::new(self.passphrase_file.as_deref())
+    }
+}
+
+#[derive(Args)]
+pub(super) struct DepositArgs {
+    /// Key file made by `meshmark keygen`
+    #[arg(long, value_name = "FILE", required_unless_present = READ_DEPOSIT)]
+    pub(super) key: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
+    /// The map as it was before marking, a local file; repeatable
+    #[arg(long, value_name = "MAP", required_unless_present = READ_DEPOSIT)]
+    pub(super) reference: Vec<PathBuf>,
+    /// Folder of the records (*.json) of all copies
+    #[arg(long, value_name = "FOLDER", required_unless_present = READ_DEPOSIT)]
+    pub(super) records: Option<PathBuf>,
+    /// Signing key made by `meshmark keygen`; by default the one beside the key file
+    #[arg(long, value_name = "FILE", conflicts_with = READ_DEPOSIT)]
+    pub(super) signing_key: Option<PathBuf>,
+    /// The deposit to write; it must not exist
+    #[arg(short, long, value_name = "FILE", required_unless_present = READ_DEPOSIT, conflicts_with = READ_DEPOSIT)]
+    pub(super) output: Option<PathBuf>,
+    /// A deposit to verify
+    #[arg(id = READ_DEPOSIT, long = "verify", value_name = "DEPOSIT")]
+    pub(super) verify: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) trust: TrustFlags,
+    /// Request for a time stamp (RFC 3161): written with a deposit, and with --verify the one that the
+    /// time stamp must answer
+    #[arg(long, value_name = "FILE")]
+    pub(super) time_stamp_request: Option<PathBuf>,
+}
+
+/// The name of the flag that names a deposit to read, of either subcommand.
+const READ_DEPOSIT: &str = "read_deposit";
+
+/// Who vouches for a deposit.
+#[derive(Args)]
+pub(super) struct TrustFlags {
+    /// Public key made by `meshmark keygen`, which the deposit must be signed with
+    #[arg(long, value_name = "FILE", requires = READ_DEPOSIT)]
+    pub(super) public_key: Option<PathBuf>,
+    /// Time stamp of the deposit: the response of an authority
+    #[arg(long, value_name = "FILE", requires_all = [READ_DEPOSIT, "authorities"])]
+    pub(super) time_stamp: Option<PathBuf>,
+    /// Certificates of the time-stamping authorities that you trust, PEM
+    #[arg(long, value_name = "FILE", requires = "time_stamp")]
+    pub(super) authorities: Option<PathBuf>,
+}
+
+#[derive(Args)]
 pub(super) struct DistributeArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
     pub(super) key: PathBuf,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
     /// List of the recipients, CSV
     #[arg(long, value_name = "FILE")]
     pub(super) recipients: PathBuf,
@@ -156,6 +262,8 @@ pub(super) struct VerifyArgs {
     /// Key file made by `meshmark keygen`
     #[arg(long, value_name = "FILE")]
     pub(super) key: PathBuf,
+    #[command(flatten)]
+    pub(super) opening: OpeningFlags,
     /// The map as it was before marking; several, such as editions, where records choose among them
     #[arg(long, value_name = "MAP", required = true)]
     pub(super) reference: Vec<PathBuf>,
@@ -165,6 +273,11 @@ pub(super) struct VerifyArgs {
     /// Folder of records (*.json), to find the recipient of the copy
     #[arg(long, value_name = "FOLDER", conflicts_with = "record")]
     pub(super) records: Option<PathBuf>,
+    /// Deposit of key, reference and record, made by `meshmark deposit`
+    #[arg(id = READ_DEPOSIT, long = "deposit", value_name = "FILE")]
+    pub(super) deposit: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) trust: TrustFlags,
     /// The map in question
     pub(super) suspect: PathBuf,
     /// Field of the reference to find landmarks by, matched with any field of the suspect by value;
@@ -196,6 +309,9 @@ pub(super) struct VerifyArgs {
     /// Write a report to read and print (.html), or to process (.json); the file must not exist
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Case file for the report, TOML: number, examiner, date, custody (a list)
+    #[arg(long, value_name = "FILE", requires = "report")]
+    pub(super) case: Option<PathBuf>,
     /// Include exact displacements of vertices in the report and the evidence map, which then must be
     /// kept as secret as the records
     #[arg(long, requires = "files")]
@@ -217,6 +333,9 @@ pub(super) struct MarkingFlags(pub(super) Vec<(&'static str, String)>);
 
 /// The marking options as flags of `distribute`; its list holds the subjects.
 pub(super) struct DistributeFlags(pub(super) Vec<(&'static str, String)>);
+
+/// Options that shape no mark by themselves, and concern those who distribute.
+const OF_DISTRIBUTE: [&str; 3] = ["ATTRIBUTES", "BASE", "BASE_REFERENCE"];
 
 const SUBJECTS: [&str; 2] = ["RECIPIENT", "MESSAGE"];
 
@@ -264,7 +383,7 @@ impl FromArgMatches for MarkingFlags {
 impl Args for DistributeFlags {
     fn augment_args(command: Command) -> Command {
         let is_wanted = |option: &OptionSpec| {
-            option.shapes_mark && !SUBJECTS.contains(&option.name) || option.name == "ATTRIBUTES"
+            option.shapes_mark && !SUBJECTS.contains(&option.name) || OF_DISTRIBUTE.contains(&option.name)
         };
         command.args(flags("How the map is marked", is_wanted))
     }

@@ -2,6 +2,8 @@
 
 mod arguments;
 mod command_line;
+mod deposit;
+mod keygen;
 mod printing;
 mod request;
 mod verification;
@@ -9,20 +11,17 @@ mod verification;
 use crate::package_files;
 use arguments::{Cli, CompareArgs, DistributeArgs, Subcommands};
 use clap::{CommandFactory, Parser};
-use meshmark_core::{counted, key::SecretKey, options::Options};
+use meshmark_core::{counted, options::Options};
 use meshmark_verifier::{
     Error, Result,
     compare::{Comparison, Details, compare, detail::ComparedFiles},
-    distribute, html,
+    copies_index, distribute, html,
     inputs::{gdal_failures, texts},
     outputs::{Format, ReportFile},
     progress::Progress,
 };
 use printing::{print, warn, warn_of_displacements};
-use std::{
-    io::{ErrorKind, Write},
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 /// The exit code of a command that succeeds; a match has the same code.
 const DONE: u8 = 0;
@@ -31,40 +30,19 @@ const DONE: u8 = 0;
 pub fn run() -> u8 {
     gdal_failures::quieten_gdal();
     let result = match Cli::parse().command {
-        Subcommands::Keygen { key_file } => keygen(&key_file).map(|()| DONE),
+        Subcommands::Keygen(args) => keygen::run(&args).map(|()| DONE),
+        Subcommands::Deposit(args) => deposit::run(&args).map(|()| DONE),
         Subcommands::Verify(args) => verification::run(&args),
         Subcommands::Examine { folder, args } => verification::examine(*args, &folder).map(|code| code as u8),
         Subcommands::Compare(args) => run_compare(&args).map(|()| DONE),
         Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
         Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),
+        Subcommands::Records { folder } => list_copies(&folder).map(|()| DONE),
     };
     result.unwrap_or_else(|error| {
         warn(&error.to_string());
         error.exit_code() as u8
     })
-}
-
-fn keygen(path: &PathBuf) -> Result<()> {
-    let key = SecretKey::filled(getrandom::fill).map_err(|source| Error::Random { source })?;
-    let failed = |error: std::io::Error| match error.kind() {
-        ErrorKind::AlreadyExists => Error::Exists {
-            path: path.clone(),
-            remedy: ", and a key is never overwritten: name another file",
-        },
-        _ => Error::unwritten(format!("the key file {}", path.display()), error),
-    };
-    let mut options = std::fs::OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let mut file = options.open(path).map_err(failed)?;
-    let written = file.write_all(key.to_json().as_bytes()).and_then(|()| file.sync_all());
-    if let Err(error) = written {
-        let _ = std::fs::remove_file(path); // an incomplete key is worse than none
-        return Err(failed(error));
-    }
-    print(&format!("key {} written to {}\n", key.id(), path.display()))?;
-    Ok(())
 }
 
 fn write_package_files(folder: &Path) -> Result<()> {
@@ -106,7 +84,7 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let request = distribute::DistributeRequest {
         options: Options::parse_for_recipients(flags)?,
-        key: texts::key(&args.key, &mut warn)?,
+        key: texts::key(&args.key, &args.opening.passphrase(), &mut warn)?,
         map: args.map,
         recipients: args.recipients,
         folder: args.output_dir,
@@ -119,4 +97,8 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
     };
     print(&format!("{} written to {}{before}\n", counted(done.written, "copy"), request.folder.display()))?;
     Ok(())
+}
+
+fn list_copies(folder: &Path) -> Result<()> {
+    print(&copies_index::to_csv(&copies_index::index(folder, &mut warn)?))
 }

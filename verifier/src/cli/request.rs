@@ -9,18 +9,23 @@ use meshmark_core::{
 use meshmark_detection::{Demodulator, matching::RadiusChoice};
 use meshmark_verifier::{
     Error, Request, Result,
-    inputs::{private_copy::PrivateCopy, texts},
-    verify::{Sought, check_key},
+    inputs::{
+        passphrase::Passphrase,
+        private_copy::PrivateCopy,
+        texts::{self, ReadRecord},
+    },
+    verify::{Sought, check_key, lineage_of},
 };
 
 /// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
 /// either.
 pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<Request>> {
-    let key = texts::key(&args.key, &mut warn)?;
+    let passphrase = Passphrase::of_child(args.opening.passphrase_file.as_deref());
+    let key = texts::key(&args.key, &passphrase, &mut warn)?;
     let record = args.record.as_deref().map(texts::record).transpose()?;
     let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
     let possible = match &record {
-        Some(record) => {
+        Some(ReadRecord { record, .. }) => {
             Options::parse(flags)?;
             check_flags(&args.marking.0, record)?;
             check_key(record, &key)?;
@@ -32,6 +37,7 @@ pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<R
     let request = |options: Options| {
         Ok(Request {
             sought: sought(&options, &key, args.demodulator.into(), tried)?,
+            lineage: record.as_ref().map(|read| lineage_of(&read.record)).unwrap_or_default(),
             tried,
             subject: options.subject,
             key: key.clone(),

@@ -2,15 +2,16 @@
 
 use super::{
     arguments::VerifyArgs,
-    command_line,
+    command_line, deposit,
     printing::{WARNING, print, warn, warn_of_displacements},
     request::requests,
 };
 use meshmark_verifier::{
     Error, ExitCode, Result,
     confinement::{self, End, Handover, Limits},
+    deposit::Expected,
     html,
-    inputs::{digests::Digests, gdal_failures, private_copy::PrivateCopy, versions::versions},
+    inputs::{case_file, digests::Digests, gdal_failures, private_copy::PrivateCopy, versions::versions},
     outputs::{EvidenceMapFile, Format, ReportFile, write_evidence_map},
     progress::{Bar, Progress},
     report::{self, Provenance, Report},
@@ -27,7 +28,8 @@ pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let evidence_map = args.evidence_map.as_deref().map(EvidenceMapFile::new).transpose()?;
     warn_of_displacements(args.exact_displacements);
-    let suspect = PrivateCopy::of("suspect", &args.suspect)?;
+    let passphrase = args.opening.passphrase().for_child(&args.key)?;
+    let suspect = PrivateCopy::make("suspect", &args.suspect)?;
     let arguments = command_line::of_examination(suspect.folder().as_os_str());
     let places = (args.suspect.as_path(), suspect.folder());
     let bar = Bar::default();
@@ -35,7 +37,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<u8> {
         let warning = line.strip_prefix(WARNING);
         warning.inspect(|text| warn(text)).is_some() || bar.show(line)
     };
-    let end = confinement::examine(arguments, places, &limits(args), &mut show);
+    let end = confinement::examine(arguments, passphrase.as_deref(), places, &limits(args), &mut show);
     bar.finish();
     let code = match end? {
         End::Code(code) => code,
@@ -103,16 +105,22 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     let format = args.report.as_deref().map(ReportFile::format_of).transpose()?;
     let references = args.reference.clone();
     let suspect = PrivateCopy::made_in(folder, &args.suspect)?;
+    let case = args.case.as_deref().map(case_file::read).transpose()?;
     let wanted = args.explain || format.is_some();
     let digest = || Digests::read(&args.key, &references, &suspect, args.record.as_deref());
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
     let requests = requests(&args, &suspect)?;
+    let files = args.deposit.as_deref().map(|path| deposit::files(path, &args.trust, None));
+    let expected = files.map(|files| Expected::read(&files, &references)).transpose()?;
     let mut progress = Progress::of_child();
     let mut report = match &records {
         Some(folder) => verify_records(&requests[0], &references, folder, &mut progress, &mut warn)?,
         None => verify(&requests, &references, &mut progress)?,
     };
+    if let Some(expected) = expected {
+        report.deposit = Some(expected.compare(&requests[0], args.record.as_deref(), &report)?);
+    }
     if let Some(map) = report.evidence_map.take() {
         write_evidence_map(&map, &Handover(folder).evidence_map())?;
     }
@@ -133,7 +141,7 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
             command: command_line::own(),
             versions: versions(),
         };
-        let report = Report { provenance: Some(provenance), evidence, ..report.into_file() };
+        let report = Report { provenance: Some(provenance), evidence, case, ..report.into_file() };
         match format {
             Format::Html => html::verification(&report),
             Format::Json => report.to_json(),

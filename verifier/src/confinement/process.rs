@@ -10,7 +10,7 @@ use signal_hook::{
 };
 use std::{
     ffi::OsStr,
-    io::{self, BufRead, BufReader, Read},
+    io::{self, BufRead, BufReader, Read, Write},
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::{Child, Command, ExitStatus, Stdio},
@@ -76,12 +76,13 @@ enum Event {
 }
 
 /// Runs `meshmark` with `arguments` as a child that examines `suspect` in `folder`, until it ends or
-/// its time is over. `show` receives each line that it prints, and returns whether it is one of ours.
+/// its time is over. The child reads `passphrase` from its standard input. `show` receives each line that it prints, and returns whether it is one of ours.
 ///
 /// # Errors
 /// Fails when the child cannot be started, and when a limit or a fault ended it.
 pub fn examine<Argument: AsRef<OsStr>>(
     arguments: impl IntoIterator<Item = Argument>,
+    passphrase: Option<&String>,
     (suspect, folder): (&Path, &Path),
     limits: &Limits,
     show: &mut dyn FnMut(&str) -> bool,
@@ -90,7 +91,7 @@ pub fn examine<Argument: AsRef<OsStr>>(
     let until = Instant::now() + limits.time();
     let (sender, events) = sync_channel(MOST_LINES);
     pass_signals(sender.clone()).map_err(failed)?;
-    let mut child = start(arguments, folder).map_err(failed)?;
+    let mut child = start(arguments, passphrase, folder).map_err(failed)?;
     let printed = child.stderr.take().expect("it is piped");
     thread::spawn(move || send_lines(BufReader::new(printed), &sender));
     let watched = watch(&events, until, show);
@@ -125,6 +126,7 @@ fn pass_signals(events: SyncSender<Event>) -> io::Result<()> {
 
 fn start<Argument: AsRef<OsStr>>(
     arguments: impl IntoIterator<Item = Argument>,
+    passphrase: Option<&String>,
     folder: &Path,
 ) -> io::Result<Child> {
     let mut command = Command::new(std::env::current_exe()?);
@@ -132,7 +134,12 @@ fn start<Argument: AsRef<OsStr>>(
     for variable in OTHER_FOLDERS {
         command.env_remove(variable);
     }
-    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn() // a key may come through stdin
+    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    let Some(passphrase) = passphrase else { return command.spawn() }; // a key may come through stdin
+    let mut child = command.stdin(Stdio::piped()).spawn()?;
+    let mut input = child.stdin.take().expect("it is piped");
+    drop(writeln!(input, "{passphrase}")); // a child that has ended says why
+    Ok(child)
 }
 
 /// Sends the lines that a child prints, to the end.

@@ -11,7 +11,11 @@ use meshmark_core::{
     record::{Record, Reference},
     recorded::Recorded,
 };
-use meshmark_dataset::{Survey, formats::Format, marking};
+use meshmark_dataset::{
+    Bases, Survey,
+    formats::Format,
+    marking::{self, Lineage},
+};
 use sha2::{Digest, Sha256};
 use std::{
     fs,
@@ -64,11 +68,11 @@ impl MarkedCopy {
         &self,
         options: &Options,
         key: &SecretKey,
-        (map, reference): (&Survey, &Reference),
+        (map, reference, bases): (&Survey, &Reference, &Bases),
     ) -> Result<bool> {
         let refused = |path: &Path, why| Err(Error::InTheWay { path: path.into(), why });
         let has_record = self.record.symlink_metadata().is_ok();
-        if has_record && !self.is_record_of_this(options, key, reference) {
+        if has_record && !self.is_record_of_this(options, key, (reference, bases)) {
             return refused(&self.record, "is not the record of this map, key, recipient and options");
         }
         if has_record && self.file.is_file() {
@@ -86,14 +90,21 @@ impl MarkedCopy {
     }
 
     /// Compares everything that is determined before the marking.
-    fn is_record_of_this(&self, options: &Options, key: &SecretKey, reference: &Reference) -> bool {
+    fn is_record_of_this(
+        &self,
+        options: &Options,
+        key: &SecretKey,
+        (reference, bases): (&Reference, &Bases),
+    ) -> bool {
         let text = fs::read_to_string(&self.record).ok();
         let Some(found) = text.and_then(|text| Recorded::from_json(&text).ok()) else { return false };
-        let (patches, distortion) = match &found {
-            Recorded::Message(record) => (record.reference.patches, record.distortion()),
-            Recorded::Fingerprint(record) => (record.parts[0].patches, record.distortion),
+        // The parts follow from the map, its bases and the options.
+        let (patches, parts, distortion) = match &found {
+            Recorded::Message(record) => (record.reference.patches, Vec::new(), record.distortion()),
+            Recorded::Fingerprint(record) => (0, record.parts.clone(), record.distortion),
         };
-        let reference = Reference { patches, ..reference.clone() };
+        let lineage = Lineage { parts, bases: bases.entries().to_vec() };
+        let reference = (Reference { patches, ..reference.clone() }, lineage);
         match (marking::recorded(options, &self.subject(), key, reference, distortion), found) {
             (Recorded::Message(expected), Recorded::Message(found)) => {
                 Record { software: found.software.clone(), ..expected } == found

@@ -5,29 +5,39 @@ use meshmark_core::{
     Result,
     embedding::{Embedding, Marked},
     fingerprint::{Fingerprint, FingerprintEmbedding},
+    fingerprint_record::PartEntry,
     key::{RECIPIENT_BITS, SecretKey},
     map::Map,
     message::Message,
     options::Options,
+    series::Series,
 };
 
 /// The part of a marking that all copies share.
 pub enum Marks<'a> {
     /// Of copies that carry messages.
-    Messages(Embedding<'a>, &'a SecretKey),
+    Messages(Box<Embedding<'a>>, &'a SecretKey),
     /// Of copies with fingerprints.
     Fingerprints(FingerprintEmbedding<'a>),
 }
 
 impl<'a> Marks<'a> {
-    /// Meshes the map and prepares for many copies.
-    pub fn new(map: &'a Map<'a>, key: &'a SecretKey, options: &'a Options) -> Result<Self> {
+    /// Meshes the map, the newest of its series, and prepares for many copies.
+    pub fn new(
+        map: &'a Map<'a>,
+        series: &'a Series<'a>,
+        key: &'a SecretKey,
+        options: &'a Options,
+    ) -> Result<Self> {
         let parameters = &options.parameters;
         Ok(match options.coefficients {
-            Some(coefficients) => Marks::Fingerprints(
-                FingerprintEmbedding::new(map, key, coefficients, parameters)?.for_many()?,
-            ),
-            None => Marks::Messages(Embedding::new(map, key, RECIPIENT_BITS, parameters)?.for_many()?, key),
+            Some(coefficients) => {
+                Marks::Fingerprints(FingerprintEmbedding::new(series, key, coefficients)?.for_many()?)
+            }
+            None => {
+                let embedding = Embedding::new(map, key, RECIPIENT_BITS, parameters)?.for_many()?;
+                Marks::Messages(Box::new(embedding), key)
+            }
         })
     }
 
@@ -36,6 +46,14 @@ impl<'a> Marks<'a> {
         match self {
             Marks::Messages(embedding, _) => embedding.patches(),
             Marks::Fingerprints(embedding) => embedding.patches(),
+        }
+    }
+
+    /// Returns the parts of fingerprints for records.
+    pub fn part_entries(&self) -> Vec<PartEntry> {
+        match self {
+            Marks::Messages(..) => Vec::new(),
+            Marks::Fingerprints(embedding) => embedding.part_entries(),
         }
     }
 

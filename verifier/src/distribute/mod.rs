@@ -31,9 +31,9 @@ use copies::MarkedCopy;
 use marks::Marks;
 use meshmark_core::options::Spelling;
 use meshmark_dataset::{
-    Survey, ThreadPool, file_digest,
+    Bases, Survey, ThreadPool, file_digest,
     formats::Format,
-    marking::{self, Unmarked},
+    marking::{self, Lineage, Unmarked},
     threads,
     workplace::Workplace,
 };
@@ -71,18 +71,19 @@ pub fn distribute(
     let done = Workplace::new(folder).map_err(Error::from).and_then(|workplace| {
         progress.start("reading", 0);
         let (dataset, map) = maps::source(&request.map, options, warn)?;
+        let bases = Bases::of_options(options, key, &map, &mut maps::base_reference)?;
         let mut copies: Vec<MarkedCopy> =
             recipients.into_iter().map(|recipient| MarkedCopy::new(recipient, folder, format)).collect();
         let all = copies.len();
         let reference = marking::reference(&map, 0);
-        let finished = copies.iter().map(|copy| copy.is_finished(options, key, (&map, &reference)));
+        let finished = copies.iter().map(|copy| copy.is_finished(options, key, (&map, &reference, &bases)));
         let finished: Vec<bool> = finished.collect::<Result<_>>()?;
         let mut finished = finished.into_iter();
         copies.retain(|_| !finished.next().expect("one of each"));
         if !copies.is_empty() {
             progress.start("copying", 0);
             let stage = Stage::new(request, format, (&dataset, &map), &workplace, warn)?;
-            run(request, &map, (format, &stage), &copies, progress, warn)?;
+            run(request, (&map, &bases), (format, &stage), &copies, progress, warn)?;
         }
         Ok(Summary { written: copies.len(), finished_before: all - copies.len() })
     });
@@ -104,7 +105,7 @@ fn make_folder(folder: &Path) -> Result<bool> {
 /// Marks and writes the copies, batch by batch.
 fn run(
     request: &DistributeRequest,
-    survey: &Survey,
+    (survey, bases): (&Survey, &Bases),
     (format, stage): (&'static Format, &Stage),
     copies: &[MarkedCopy],
     progress: &mut Progress,
@@ -120,11 +121,13 @@ fn run(
     let pool = ThreadPool::new(threads, || (), || ());
     let pool = pool.map_err(|source| Error::Threads { source })?;
     progress.start("patches", 0);
-    let marks = pool.install(|| Marks::new(&map, key, options))?;
+    let series = pool.install(|| bases.series(map, parameters))?;
+    let marks = pool.install(|| Marks::new(&map, &series, key, options))?;
     let message = options.coefficients.is_none().then(|| copies[0].carried(key));
     let warnings = marking::warnings(options, message.as_ref(), survey, marks.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
-    let reference = marking::reference(survey, marks.patches());
+    let lineage = Lineage { parts: marks.part_entries(), bases: bases.entries().to_vec() };
+    let reference = (marking::reference(survey, marks.patches()), lineage);
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
     let unmarked = pool.install(|| Unmarked::new(geometries, &map));
     let vertices = &survey.data.vertices;

@@ -16,7 +16,7 @@ use meshmark_core::{
 use meshmark_dataset::{
     Action, Error as MapError, damage_warning, digest_of_only_file, file_error,
     formats::Format,
-    marking::{self, Moves, Unmarked},
+    marking::{self, Lineage, Moves, Unmarked},
     publication::{Move, Publication},
     read_back::ReadBack,
     workplace::Workplace,
@@ -29,7 +29,8 @@ pub struct Job<'a> {
     pub options: &'a Options,
     pub vertices: &'a VertexTable,
     pub unmarked: Unmarked<'a>,
-    pub reference: Reference,
+    /// What records say of the map.
+    pub reference: (Reference, Lineage),
     /// The digest of the map, where it is one file.
     pub map_sha256: Option<String>,
     pub format: &'static Format,

@@ -34,8 +34,14 @@ fn files(report: &Report, provenance: &Provenance) -> Markup {
     };
     let map = |vertices: usize, crs: &str| html! { (count(vertices)) " vertices, " (crs) };
     let reference_crs = report.parameters.crs.as_deref().unwrap_or("no CRS");
+    let notice = explain::same_file(inputs).map(|text| html! { " " b { (text) } });
     table(&[
-        ("Suspect", Some(html! { (file(&inputs.suspect, &map(v.suspect, &crs))) br; (explain::UNTOUCHED) })),
+        (
+            "Suspect",
+            Some(
+                html! { (file(&inputs.suspect, &map(v.suspect, &crs))) br; (explain::UNTOUCHED) @if let Some(notice) = notice { (notice) } },
+            ),
+        ),
         ("Reference", Some(file(&inputs.reference, &map(v.reference, reference_crs)))),
         ("Key", Some(file(&inputs.key, &html! { "public id " code { (report.parameters.key_id) } }))),
         ("Record", Some(record(report, inputs.record.as_ref()))),
@@ -130,12 +136,12 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
             @if candidates.tried > candidates.list.len() {
                 @if candidates.matches > 0 { " Those that match are listed." } @else { " The nearest one is listed." }
                 @if let Some(p) = candidates.next_p_value_log10 {
-                    " The best of the others has a probability of " (words::probability(p)) "."
+                    " The best of the others fits so well by chance with the probability " (words::probability(p)) "."
                 }
             }
         }
         table.list {
-            thead { tr { th { "Recipient" } th { "Record" } @if has_bits { th.number { "Bits that differ" } } th.number { "Probability" } th { "" } } }
+            thead { tr { th { "Recipient" } th { "Record" } @if has_bits { th.number { "Bits that differ" } } th.number { "By chance" } th { "" } } }
             tbody {
                 @for (number, entry) in candidates.list.iter().enumerate() {
                     tr {
@@ -146,7 +152,7 @@ fn tried(report: &Report, candidates: &Candidates) -> Markup {
                         td { (printable(&entry.record)) }
                         @if has_bits { td.number { @if let Some(errors) = entry.bit_errors { (errors) } @else { "–" } } }
                         td.number { @if let Some(p) = entry.p_value_log10 { (words::probability(p)) } @else { "–" } }
-                        td { @if number < candidates.matches && entry.p_value_log10.is_some_and(|p| p < significance) { b { "match" } } }
+                        td.whole { @if number < candidates.matches && entry.p_value_log10.is_some_and(|p| p < significance) { b { "match" } } }
                     }
                 }
             }

@@ -46,7 +46,7 @@ pub fn comparison(comparison: &Comparison) -> String {
         } }))
         @if let Some(provenance) = provenance { (section("How to repeat it", &repeat(provenance))) }
     };
-    page("Quality of a marked map", concat!("meshmark ", env!("CARGO_PKG_VERSION")), &body)
+    page("Quality of a marked map", concat!("meshmark ", env!("CARGO_PKG_VERSION")), "", &body)
 }
 
 fn is_kept(comparison: &Comparison) -> bool {

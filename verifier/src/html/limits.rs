@@ -11,8 +11,9 @@ use meshmark_detection::{
 
 pub fn limits(report: &Report) -> Markup {
     html! {
-        (section("What was not tested", &list(&explain::NOT_TESTED.map(String::from))))
+        (section("What was not tested", &list(&explain::not_tested(report))))
         (section("What would weaken this finding", &list(&weaknesses(report))))
+        (section("Five words", &glossary()))
         @if let Some(provenance) = &report.provenance {
             @let deposit = explain::deposit(&provenance.inputs, report);
             (section("What makes this evidence", &html! {
@@ -26,6 +27,25 @@ pub fn limits(report: &Report) -> Markup {
             }))
         }
     }
+}
+
+/// The words that a reader who never saw a watermark needs.
+const WORDS: [[&str; 2]; 5] = [
+    [
+        "Mark",
+        "displacements of centimetres that were hidden in a copy of the map, and that are different in every copy.",
+    ],
+    ["Reference", "the map as it was before it was marked."],
+    ["Suspect", "the map in question."],
+    ["Patch", "a piece of the map that carries the mark by itself."],
+    [
+        "By chance",
+        "the probability that a key and a recipient that have nothing to do with the suspect fit as well.",
+    ],
+];
+
+fn glossary() -> Markup {
+    html! { dl.words { @for [word, meaning] in WORDS { div { dt { (word) } dd { (meaning) } } } } }
 }
 
 fn list(sentences: &[String]) -> Markup {

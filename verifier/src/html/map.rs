@@ -3,7 +3,7 @@
 use super::{
     frame::{Frame, MOST_LABELLED, largest_below, metres},
     members::members,
-    page::{count, figure, section},
+    page::{count, counted, figure, section},
 };
 use crate::report::{Evidence, Report};
 use maud::{Markup, html};
@@ -13,8 +13,8 @@ use std::fmt::Write as _;
 /// Classes of patches: the score from which a class begins, standard deviations, its name and its
 /// meaning.
 const CLASSES: [(f64, &str, &str); 5] = [
-    (f64::NEG_INFINITY, "against", "below 0: speaks against"),
-    (0.0, "e0", "0 to 2: says nothing by itself"),
+    (f64::NEG_INFINITY, "against", "below −2: against the mark"),
+    (-2.0, "e0", "−2 to 2: no evidence by itself"),
     (2.0, "e1", "2 to 4"),
     (4.0, "e2", "4 to 8"),
     (8.0, "e3", "8 or more"),
@@ -87,8 +87,8 @@ fn patches(report: &Report, evidence: &Evidence, frame: &Frame) -> Markup {
              values around 0, hardly one above 3. "
             @if seen.is_empty() { "In none of them did anything move." }
             @else {
-                (count(seen.iter().filter(|s| **s >= 2.0).count())) " of the " (count(seen.len()))
-                " patches that were seen reach 2 by themselves."
+                "Of the " (counted(seen.len(), "patch")) " that " @if seen.len() == 1 { "was" } @else { "were" } " seen, "
+                (count(seen.iter().filter(|s| **s >= 2.0).count())) " reached 2 alone."
             }
             (legend(evidence))
         } @else {

@@ -34,7 +34,7 @@ fn decoded(report: &Report, message: &str) -> Markup {
                 (Some(errors), expected) => {
                     ", which differs from the expected message "
                     @if let Some(expected) = expected { code { (expected) } " " }
-                    "in " (count(errors)) " of " (count(report.bits.len())) " bits. "
+                    "in " (count(errors)) " of " (count(report.bits.len())) " bits; by chance " (count(report.bits.len() / 2)) " would. "
                 }
                 _ => { "; no message was expected. " }
             }

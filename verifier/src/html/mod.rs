@@ -1,6 +1,7 @@
 //! The report as a page: one self-contained HTML file without scripts. It shows the content of the
 //! JSON report and computes nothing beyond it.
 
+mod case;
 mod chart;
 mod compared;
 mod comparison;
@@ -26,6 +27,7 @@ use page::page;
 pub fn verification(report: &Report) -> String {
     let body = html! {
         (verdict::verdict(report))
+        (case::case(report))
         (compared::compared(report))
         (map::evidence(report))
         @match report.parameters.mark {
@@ -37,5 +39,5 @@ pub fn verification(report: &Report) -> String {
         (compared::settings(report))
         (limits::limits(report))
     };
-    page("Verification of a watermark", &report.parameters.software, &body)
+    page("Verification of a watermark", &report.parameters.software, &case::running_head(report), &body)
 }

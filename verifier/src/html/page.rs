@@ -2,8 +2,8 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Renders a complete page.
-pub fn page(title: &str, software: &str, body: &Markup) -> String {
+/// Renders a complete page, with a style of its own beside that of all pages.
+pub fn page(title: &str, software: &str, style: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -12,7 +12,7 @@ pub fn page(title: &str, software: &str, body: &Markup) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="generator" content=(software);
                 title { (title) }
-                style { (PreEscaped(include_str!("style.css"))) }
+                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(style)) }
             }
             body {
                 main {

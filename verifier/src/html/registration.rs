@@ -6,6 +6,7 @@ use super::{
 };
 use crate::report::{Evidence, Report, explain};
 use maud::{Markup, html};
+use meshmark_core::deformation::LEAST_NOISE_M;
 use meshmark_detection::{decision::Verdict, registration::Method};
 
 pub fn registration(report: &Report) -> Markup {
@@ -37,7 +38,10 @@ pub fn registration(report: &Report) -> Markup {
             ("Beyond that", r.polynomial.map(|_| html! { "a cubic polynomial" })),
             ("Residual", r.rms_m.map(|rms| html! { (format!("{rms:.3} m RMS of matched vertices")) })),
             ("Deformation", report.evidence.as_ref().map(deformation)),
-            ("Noise", report.parameters.noise_m.map(|noise| html! { (format!("{noise:.3} m per axis, neither mark nor deformation")) })),
+            ("Noise", report.parameters.noise_m.map(|noise| html! {
+                @if noise <= LEAST_NOISE_M { (format!("none beyond {LEAST_NOISE_M} m per axis, the least that is assumed")) }
+                @else { (format!("{noise:.3} m per axis, neither mark nor deformation")) }
+            })),
         ]))
         @if let Some(evidence) = &report.evidence { (residuals(evidence)) }
     };

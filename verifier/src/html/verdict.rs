@@ -99,7 +99,10 @@ fn figures(report: &Report) -> Markup {
                 div { dt { "Probability that a present mark is missed, at most" } dd { (words::probability(p)) } }
             }
             @if let Some(errors) = report.bit_errors {
-                div { dt { "Message bits that differ" } dd { (count(errors)) " of " (count(report.bits.len())) } }
+                div { dt { "Message bits that differ" } dd {
+                    (count(errors)) " of " (count(report.bits.len()))
+                    @if errors > 0 { ", by chance " (count(report.bits.len() / 2)) }
+                } }
             }
             div { dt { "Vertices found" } dd { (count(v.matched)) " of " (count(v.reference)) } }
             div { dt { "Match means below" } dd { (words::probability(report.parameters.significance.log10())) } }

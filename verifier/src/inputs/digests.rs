@@ -85,6 +85,20 @@ fn of_copy(suspect: &PrivateCopy) -> Result<Digested> {
     Ok(Digested { path, ..digest(suspect.copy())? })
 }
 
+/// Returns the names and the SHA-256 of the files of a map; none for what is no local file or folder.
+///
+/// # Errors
+/// Fails when one of them cannot be read to its end.
+pub fn files_digests(path: &Path) -> Result<Vec<(String, String)>> {
+    let failed = |error: io::Error| Error::Undigested { path: path.into(), source: error };
+    let files = files_of(path).map_err(failed)?;
+    let digested = files.into_iter().map(|file| {
+        let digest = file_digest(&file.path).map_err(failed)?;
+        Ok((file.name.to_string_lossy().into_owned(), digest))
+    });
+    digested.collect()
+}
+
 /// Returns the SHA-256 of a file. For a folder with all in it, or a file with companions of the same name, it is
 /// that of the sorted list of their digests as `sha256sum` prints it.
 pub(crate) fn digest(path: &Path) -> Result<Digested> {

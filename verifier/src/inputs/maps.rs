@@ -9,6 +9,7 @@ use super::{
 use crate::{Error, Result};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags, vector::LayerAccess};
 use meshmark_core::{
+    fingerprint_record::BaseEntry,
     ground::Ground,
     options::{Options, Spelling},
 };
@@ -40,6 +41,17 @@ pub fn reference(path: &Path, reading: &Reading) -> Result<Survey> {
     read("reference", path, dataset, reading)
 }
 
+/// Reads the reference of an edition; nothing where a map lacks its layers.
+pub fn base_reference(path: &Path, entry: &BaseEntry) -> Result<Option<Survey>> {
+    let (layers, srs) = (entry.layers.as_deref(), entry.srs.as_deref());
+    let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: false };
+    match reference(path, &reading) {
+        Ok(survey) => Ok(Some(survey)),
+        Err(Error::Map { source, .. }) if source.is_of_other_layers() => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 /// A dataset, and the private copy that it is opened from. They are dropped in this order.
 struct Opened {
     dataset: Dataset,
@@ -51,7 +63,7 @@ fn open_untouched(what: &'static str, path: &Path) -> Result<Opened> {
     if !has_logs(path) {
         return Ok(Opened { dataset: open(what, path)?, _copy: None });
     }
-    let copy = PrivateCopy::of(what, path)?;
+    let copy = PrivateCopy::make(what, path)?;
     journal::roll_back(what, &copy)?;
     let names = named_as(path, copy.copy());
     let dataset = open_with(copy.copy(), None, &[]).map_err(|source| Error::Unopened {

@@ -2,10 +2,12 @@
 //! the files, and the versions of the programs that read them.
 
 mod belonging_files;
+pub mod case_file;
 pub mod digests;
 pub mod gdal_failures;
 mod journal;
 pub mod maps;
+pub mod passphrase;
 pub mod private_copy;
 mod suspect_formats;
 pub mod suspects;

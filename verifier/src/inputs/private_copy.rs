@@ -32,7 +32,7 @@ impl PrivateCopy {
     ///
     /// # Errors
     /// Fails for what is neither a file nor a folder, and where it cannot be read or copied.
-    pub fn of(what: &'static str, original: &Path) -> Result<Self> {
+    pub fn make(what: &'static str, original: &Path) -> Result<Self> {
         if !original.is_file() && !original.is_dir() {
             return Err(Error::NoFile { path: original.into() });
         }

@@ -31,6 +31,9 @@ pub struct Entry {
     pub p_value_log10: Option<f64>,
     /// Number of decoded bits that differ from the message of a record that matches; null otherwise.
     pub bit_errors: Option<usize>,
+    /// SHA-256 of the file, as it was read.
+    #[serde(skip)]
+    pub(crate) sha256: String,
 }
 
 impl Candidates {

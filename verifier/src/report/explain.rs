@@ -1,6 +1,6 @@
 //! The output of `--explain`: the report in sentences, for readers who depend on it.
 
-use super::{FingerprintEntry, MarkParameters, PatchAgreement, Report};
+use super::{DepositEntry, FingerprintEntry, MarkParameters, PatchAgreement, Report, Standing};
 use crate::{
     inputs::digests::Inputs,
     words::{clipped, power_of_ten},
@@ -15,7 +15,7 @@ pub fn explain(inputs: &Inputs, report: &Report) -> String {
         ("What was compared", compared(inputs, report)),
         ("What was found", found(report)),
         (what_is_bound(report), bound(report)),
-        ("What was not tested", NOT_TESTED.map(String::from).to_vec()),
+        ("What was not tested", not_tested(report)),
         ("What makes this evidence", deposit(inputs, report)),
     ];
     let mut text = String::new();
@@ -61,11 +61,20 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
         None => "There was no record: how the map was marked was taken from the command line.".into(),
     });
     sentences.push(format!("File of the suspect: {}. {UNTOUCHED}", inputs.suspect.digest));
+    sentences.extend(same_file(inputs));
     sentences
 }
 
 /// `Digests::of_verification` fails otherwise.
 pub(crate) const UNTOUCHED: &str = "It was examined as a private copy, and had the same digest afterwards.";
+
+/// Returns a notice where suspect and reference are the same.
+pub(crate) fn same_file(inputs: &Inputs) -> Option<String> {
+    (inputs.suspect.digest == inputs.reference.digest).then(|| {
+        "Suspect and reference have the same digest: the suspect is the unmarked map itself, or was given by mistake."
+            .into()
+    })
+}
 
 /// Returns sentences about the deposit of key and reference.
 pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
@@ -73,24 +82,59 @@ pub fn deposit(inputs: &Inputs, report: &Report) -> Vec<String> {
         "Whoever has the key and the reference can mark a map for any recipient, also afterwards, and can try \
          keys until one seems to fit."
             .into(),
-        "So reference, key and record must have been deposited with someone else before the copy was handed \
-         out, or these digests of them:"
-            .into(),
+        match &report.deposit {
+            None => "So reference, key and record must have been deposited with someone else before the copy was handed \
+                     out, or these digests of them:"
+                .into(),
+            Some(entry) => format!(
+                "The deposit with SHA-256 {}, signed with {}, rules that out for what it holds, {}.",
+                entry.sha256,
+                entry.signer(),
+                entry.since()
+            ),
+        },
         format!("Vertices of the reference: SHA-256 {}.", report.reference_digest),
         format!("File of the reference: {}.", inputs.reference.digest),
         format!("File of the key: {}; its id is {}.", inputs.key.digest, report.parameters.key_id),
     ];
     let record = inputs.record.as_ref();
     sentences.extend(record.map(|record| format!("File of the record: {}.", record.digest)));
+    let standing = report.deposit.iter().map(|entry| &entry.standing);
+    for Standing { fixed, not_fixed } in standing {
+        sentences.push(format!("The deposit holds: {}.", fixed.join(", ")));
+        sentences.extend(not_fixed.iter().map(|what| format!("The deposit does not hold: {what}.")));
+    }
     sentences
 }
 
-pub(crate) const NOT_TESTED: [&str; 4] = [
-    "Who passed the map on: the mark identifies the copy it was made from.",
-    "Attributes, styles and which features are there: the mark is in the coordinates alone.",
-    "When the mark was made, and whether key and record are older than the suspect.",
-    "Other keys and other references: the p-values hold for one key and one reference fixed beforehand.",
-];
+/// Returns what a verification leaves open.
+pub(crate) fn not_tested(report: &Report) -> Vec<String> {
+    let time = match &report.deposit {
+        Some(DepositEntry { since: Some(_), .. }) => "When the mark was made.",
+        _ => "When the mark was made, and whether key and record are older than the suspect.",
+    };
+    let others = match (&report.candidates, &report.parameters.mark) {
+        (None, _) => {
+            "Other recipients, and mixtures of their copies: one copy was tried, where --records tries all."
+        }
+        (_, MarkParameters::Message(_)) => {
+            "Mixtures of more copies than an average of a few, and copies of which there is no record."
+        }
+        (_, MarkParameters::Fingerprint(_)) => {
+            "Copies of which there is no record, and mixtures of so many copies that none of them shows by itself."
+        }
+    };
+    [
+        "Who passed the map on: the mark identifies the copy it was made from.",
+        others,
+        "Whether somebody else had the key, who could mark copies as well.",
+        "Attributes, styles and which features are there: the mark is in the coordinates alone.",
+        time,
+        "Other keys and other references: the p-values hold for one key and one reference fixed beforehand.",
+    ]
+    .map(String::from)
+    .to_vec()
+}
 
 fn found(report: &Report) -> Vec<String> {
     let (v, p) = (&report.vertices, &report.parameters);
@@ -117,7 +161,11 @@ fn found(report: &Report) -> Vec<String> {
         return sentences;
     };
     let errors = report.bit_errors.map_or(String::new(), |errors| {
-        format!(", which differs from the expected message in {errors} of {} bits", report.bits.len())
+        format!(
+            ", which differs from the expected message in {errors} of {} bits{}",
+            report.bits.len(),
+            report.bits_by_chance()
+        )
     });
     let other = report.other_reading();
     sentences.push(format!("The suspect was read as the message {message}{other}{errors}."));

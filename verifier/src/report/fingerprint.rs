@@ -93,7 +93,7 @@ impl PatchAgreement {
     pub const CLEAR: f64 = 4.0;
 
     /// Counts the patches, given the score of each; `None` where nothing was observed.
-    pub fn of(scores: &[Option<f64>]) -> Self {
+    pub fn new(scores: &[Option<f64>]) -> Self {
         let seen = scores.iter().flatten();
         let clear = seen.clone().filter(|score| **score >= Self::CLEAR).count();
         PatchAgreement { seen: seen.count(), clear }
@@ -110,7 +110,7 @@ mod tests {
         let text = "of 10240 secret signs of the key 9812 agree; by chance 5120 ± 51 would";
         assert_eq!(agreement.to_text("of the key"), text);
         assert!(agreement.p_log10 < -1000.0);
-        let patches = PatchAgreement::of(&[Some(4.0), Some(3.9), None, Some(-4.0)]);
+        let patches = PatchAgreement::new(&[Some(4.0), Some(3.9), None, Some(-4.0)]);
         assert_eq!((patches.seen, patches.clear), (3, 1));
     }
 }

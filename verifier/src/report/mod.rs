@@ -2,6 +2,8 @@
 //! [`outputs`](crate::outputs) writes the files.
 
 mod candidates;
+mod case;
+mod deposit;
 mod evidence;
 mod evidence_map;
 pub(crate) mod explain;
@@ -11,6 +13,8 @@ pub mod sketch;
 mod text;
 
 pub use candidates::{Candidates, Entry};
+pub use case::Case;
+pub use deposit::{DepositEntry, Standing};
 pub use evidence::{Evidence, Member, Provenance};
 pub use evidence_map::{EvidenceMap, ExactDisplacement, FoundVertex, PatchEvidence};
 pub use explain::explain;
@@ -74,6 +78,10 @@ pub struct Report {
     pub p_any_message_log10: Option<f64>,
     /// The records that were tried; null when the request names one mark.
     pub candidates: Option<Candidates>,
+    /// The case, from a case file; null without one.
+    pub case: Option<Case>,
+    /// The deposit of key, reference and record; null without one.
+    pub deposit: Option<DepositEntry>,
     /// Scores of decoy keys; null when nothing was decoded or no vertex moved.
     pub decoys: Option<Decoys>,
     /// The registration of the suspect.

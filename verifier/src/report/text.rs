@@ -18,7 +18,11 @@ impl Report {
         }
         if let Some(message) = &self.message {
             let errors = self.bit_errors.map_or(String::new(), |errors| {
-                format!(" ({errors} of {} bits differ from the expected message)", self.bits.len())
+                format!(
+                    " ({errors} of {} bits differ from the expected message{})",
+                    self.bits.len(),
+                    self.bits_by_chance()
+                )
             });
             lines.push(format!("message:      {message}{}{errors}", self.other_reading()));
             // Noise also decodes to a code word and bits, whose odds are valid only for a mark.
@@ -40,6 +44,7 @@ impl Report {
             v.suspect,
             self.read_from()
         ));
+        lines.extend(self.deposit.iter().flat_map(|deposit| deposit.to_lines()));
         lines.extend(self.left_out.to_text().map(|faults| format!("left out:     {faults}")));
         lines.push(format!("registration: {}", self.registration.to_text()));
         lines.join("\n") + "\n"
@@ -100,6 +105,14 @@ impl Report {
                 "; the displacements are those of the bounding boxes of polygons, which its rings are"
             }
             Some(Observations::Vertices) | None => "",
+        }
+    }
+
+    /// Returns how many bits of an unrelated message differ, where some do, as an addition to a sentence.
+    pub(crate) fn bits_by_chance(&self) -> String {
+        match self.bit_errors {
+            Some(1..) => format!("; by chance {} would", self.bits.len() / 2),
+            _ => String::new(),
         }
     }
 

@@ -14,7 +14,7 @@ use crate::report::{
 use meshmark_core::{carrier::Carrier, fingerprint_record::FingerprintShape, message::Message};
 use meshmark_detection::{
     Demodulator,
-    decision::{Decision, Decoys, Verdict, p_any_message_log10},
+    decision::{Decision, Decoys, Verdict, fingerprints, p_any_message_log10},
 };
 use std::collections::BTreeMap;
 
@@ -125,7 +125,7 @@ pub fn conclude_fingerprint(
     };
     let fingerprint = FingerprintEntry {
         recipient: Some(of_recipient),
-        patches: Some(PatchAgreement::of(&scores)),
+        patches: Some(PatchAgreement::new(&scores)),
         recipient_decoys: scored(&found.recipient_decoys, Some(standing.agreement.score)),
         ..of_key
     };
@@ -138,11 +138,20 @@ pub fn conclude_fingerprint(
         ..report(
             request,
             seen,
-            (answer.verdict, answer.reason.clone()),
+            (answer.verdict, reason(request, answer)),
             seconds,
             (&|_| scores.clone(), members),
         )
     }
+}
+
+/// Returns the reason of an answer. Without a record nothing says whether a map rests on earlier editions.
+fn reason(request: &Request, answer: &fingerprints::Answer) -> String {
+    let reservation = match answer.verdict == Verdict::NoMatch && request.record.is_none() {
+        true => ": an edition that rests on earlier ones shows with its record alone",
+        false => "",
+    };
+    answer.reason.clone() + reservation
 }
 
 fn without_recipient(shows_key: bool) -> String {
@@ -188,6 +197,8 @@ fn report(
         null_hypothesis: None,
         p_any_message_log10: None,
         candidates: None,
+        case: None,
+        deposit: None,
         decoys: None,
         registration: seen.registration.clone(),
         vertices: seen.vertices,

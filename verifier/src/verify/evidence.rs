@@ -9,7 +9,7 @@ use meshmark_core::{
     estimation::Estimates,
     fingerprint::{Fingerprint, pilots, recipient_signs},
     key::SecretKey,
-    part::PartDigest,
+    part::Parts,
 };
 use meshmark_detection::{
     Demodulated, Estimated, Matched, Observations,
@@ -21,6 +21,7 @@ use meshmark_detection::{
     matching::{Matches, Radius},
     power::Power,
 };
+use std::collections::BTreeMap;
 
 /// The evidence about the mark that is sought.
 pub enum Found {
@@ -44,8 +45,8 @@ pub struct MessageEvidence {
 pub struct FingerprintEvidence {
     /// The estimates of all signs.
     pub estimates: Estimates,
-    /// The part of the map, on which the signs depend.
-    pub part: PartDigest,
+    /// The parts of the map, on which the signs depend.
+    pub parts: Parts,
     /// The standing of each recipient, and the answer about it.
     pub recipients: Vec<(Standing, Answer)>,
     /// The agreement of the key's pilots.
@@ -106,6 +107,20 @@ fn of_message(
     Ok((Found::Message(MessageEvidence { demodulation, power, decoys }), surroundings))
 }
 
+/// Returns every recipient once, and the place of each among these. Twice in a coalition, a recipient
+/// would be the noise that hides himself.
+fn distinct(recipients: &[String]) -> (Vec<&String>, Vec<usize>) {
+    let (mut names, mut numbers) = (Vec::new(), BTreeMap::new());
+    let mut number = |recipient| {
+        *numbers.entry(recipient).or_insert_with(|| {
+            names.push(recipient);
+            names.len() - 1
+        })
+    };
+    let places = recipients.iter().map(&mut number).collect();
+    (names, places)
+}
+
 /// Estimates all signs, and decides on the recipients of a request.
 fn of_fingerprints(
     request: &Request,
@@ -114,10 +129,11 @@ fn of_fingerprints(
     progress: &mut Progress,
 ) -> meshmark_core::Result<(Found, Surroundings)> {
     let (parameters, significance) = (&request.parameters, request.significance);
-    let part = PartDigest::of(&matched.reference.data.vertices);
-    let pilots = pilots(&request.key, &part);
-    let fingerprint = |recipient: &String| Fingerprint::new(&request.key, &part, recipient);
-    let fingerprints: Vec<Fingerprint> = recipients.iter().map(fingerprint).collect();
+    let parts = matched.reference.parts.clone();
+    let pilots = pilots(&request.key, &parts);
+    let (names, places) = distinct(recipients);
+    let fingerprint = |recipient: &&String| Fingerprint::new(&request.key, &parts, recipient);
+    let fingerprints: Vec<Fingerprint> = names.iter().map(fingerprint).collect();
     let seen = progress.listen(|listener| matched.estimate(parameters, listener))?;
     let power =
         progress.listen(|listener| Power::of_fingerprint(matched, &seen, &pilots, parameters, listener))?;
@@ -129,8 +145,8 @@ fn of_fingerprints(
     let of_pilots = (of_pilots.amplitude(&pilots), of_pilots.agreement(&pilots).score);
     let grounds = Grounds::new(&evidence, of_pilots, power, (tried, significance));
     let mut standings = matched.name_recipients(&seen, &fingerprints, parameters, (tried, significance))?;
-    if grounds.ask_for_bets(&standings) {
-        matched.bet_on_shares(
+    if grounds.ask_for_shares(&standings) {
+        matched.look_for_shares(
             &seen,
             &fingerprints,
             &pilots,
@@ -139,8 +155,8 @@ fn of_fingerprints(
             &mut standings,
         )?;
     }
-    let decide = |standing: Standing| (standing, grounds.decide(&standing));
-    let recipients = standings.into_iter().map(decide).collect();
+    let decide = |&place: &usize| (standings[place], grounds.decide(&standings[place]));
+    let recipients = places.iter().map(decide).collect();
     let pilots = seen.key_agreement(&pilots);
     let Estimated { estimates, radius, matches, disturbance, observations, .. } = seen;
     let deformation = disturbance.deformation;
@@ -153,7 +169,7 @@ fn of_fingerprints(
     let surroundings =
         Surroundings { radius, matches, deformation: Some(deformation), weights, observations };
     let found =
-        FingerprintEvidence { estimates, part, recipients, pilots, recipient_decoys, key_decoys, noise_m };
+        FingerprintEvidence { estimates, parts, recipients, pilots, recipient_decoys, key_decoys, noise_m };
     Ok((Found::Fingerprint(found), surroundings))
 }
 
@@ -161,8 +177,21 @@ impl FingerprintEvidence {
     /// Returns the score of a recipient in every patch alone; `None` where nothing was observed.
     pub fn patch_scores(&self, key: &SecretKey, recipient: &str) -> Vec<Option<f64>> {
         let evidence = Evidence::of_recipients(&self.estimates);
-        let signs = recipient_signs(key, &self.part, recipient);
+        let signs = recipient_signs(key, &self.parts, recipient);
         let score = |patch: Agreement| (patch.signs > 0).then_some(patch.score);
         evidence.patch_agreements(&signs).into_iter().map(score).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipient_of_several_records_is_one_candidate() {
+        let recipients = ["B", "A", "B", "C", "A"].map(String::from);
+        let (names, places) = distinct(&recipients);
+        assert_eq!(names, ["B", "A", "C"]);
+        assert_eq!(places, [0, 1, 0, 2, 1]);
     }
 }

@@ -15,7 +15,8 @@ use crate::{
     progress::Progress,
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
-use meshmark_dataset::{CoordinateSystem, LeftOut, Survey};
+use meshmark_core::{fingerprint_record::PartEntry, map::Map};
+use meshmark_dataset::{Bases, CoordinateSystem, LeftOut, Survey};
 use meshmark_detection::{
     Matched, Observations, Reference,
     decision::{Decision, Expected, decide_among},
@@ -121,7 +122,7 @@ impl<T> Suited<T> {
 /// Fails when the suspect is unreadable.
 pub fn examine(
     request: &Request,
-    reference: &Survey,
+    (reference, bases): (&Survey, &Bases),
     progress: &mut Progress,
 ) -> Result<Suited<Examination>> {
     let unfit =
@@ -133,17 +134,16 @@ pub fn examine(
     let suspect = read_suspect(request, reference, progress)?;
     let suspect_crs = suspect.layer_crs.clone();
     progress.start("patches", 0);
-    let (data, parameters) = (&reference.data, &request.parameters);
-    let compared = match &request.sought {
-        Sought::Message { bits } => Reference::new(data, &map, *bits, parameters),
-        Sought::Fingerprint { coefficients, .. } => {
-            Reference::for_fingerprints(data, &map, *coefficients, parameters)
-        }
-    };
-    let compared = match compared {
+    let digest = reference.data.vertices.digest();
+    let united = (!bases.is_empty()).then(|| bases.united(reference)).transpose()?;
+    let reference = united.as_ref().unwrap_or(reference);
+    let compared = match compared(request, map, (reference, bases)) {
         Ok(compared) => compared,
-        Err(error) => return Ok(unfit(error.into())), // this comes before the search for the map
+        Err(error) => return Ok(unfit(error)), // this comes before the search for the map
     };
+    if !bases.is_empty() && !has_parts(&compared, &request.lineage.parts) {
+        return Ok(Suited::No(Error::OtherPartsOfBases { parts: request.lineage.parts.len() }));
+    }
     let Registered { map: suspect, registration } =
         register(request, (reference, &compared), suspect, progress)?;
     progress.start("matching", 0);
@@ -154,7 +154,29 @@ pub fn examine(
     };
     let crs = reference.crs.as_ref();
     let seen = seen(request, (&matched, evidence), registration, crs);
-    Ok(Suited::Yes(Examination { suspect_crs, left_out: suspect.left_out, ..seen }))
+    let left_out = suspect.left_out;
+    Ok(Suited::Yes(Examination { suspect_crs, left_out, reference_digest: digest, ..seen }))
+}
+
+/// Meshes the reference, which has the vertices of its bases, too; `newest` has its own alone.
+fn compared<'a>(
+    request: &Request,
+    newest: Map,
+    (reference, bases): (&'a Survey, &Bases),
+) -> meshmark_dataset::Result<Reference<'a>> {
+    let parameters = &request.parameters;
+    let map = reference.map(parameters)?;
+    Ok(match &request.sought {
+        Sought::Message { bits } => Reference::new(&reference.data, &map, *bits, parameters)?,
+        Sought::Fingerprint { coefficients, .. } => {
+            let series = bases.series(newest, parameters)?;
+            Reference::for_fingerprints(&reference.data, &map, &series, *coefficients)?
+        }
+    })
+}
+
+fn has_parts(reference: &Reference, recorded: &[PartEntry]) -> bool {
+    reference.parts.as_slice().iter().map(|part| part.digest).eq(recorded.iter().map(|part| part.sha256))
 }
 
 fn read_suspect(request: &Request, reference: &Survey, progress: &mut Progress) -> Result<Suspect> {

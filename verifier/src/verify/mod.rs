@@ -19,17 +19,17 @@ mod records;
 mod references;
 mod request;
 
-pub use belonging::{check_key, check_reference};
+pub use belonging::{check_key, check_reference, is_made_from};
 pub use evidence::{FingerprintEvidence, Found, MessageEvidence};
 pub use examination::{Examination, Suited, examine, read_reference};
 pub use records::verify_records;
-pub use request::{Request, Sought};
+pub use request::{Request, Sought, lineage_of};
 
 use crate::{Error, Result, progress::Progress, report::Report};
 use conclusion::{conclude, conclude_fingerprint};
 use meshmark_core::options::Subject;
 use meshmark_detection::decision::{Decision, Expected, Verdict};
-use references::read_own_reference;
+use references::{read_bases, read_own_reference};
 use std::path::PathBuf;
 
 /// Verifies one suspect against the only reference, or against that of several from which the record
@@ -71,7 +71,8 @@ fn better(first: Report, second: Report) -> Report {
 
 fn verify_mark(request: &Request, references: &[PathBuf], progress: &mut Progress) -> Result<Report> {
     let (request, reference) = read_own_reference(request, references, progress)?;
-    let seen = examine(&request, &reference, progress)?.or_fail()?;
+    let bases = read_bases(&request, references)?;
+    let seen = examine(&request, (&reference, &bases), progress)?.or_fail()?;
     if matches!(request.sought, Sought::Fingerprint { .. }) {
         return Ok(conclude_fingerprint(&request, &seen, 0, progress.finish()));
     }

@@ -9,18 +9,19 @@ use super::{
     disclosed,
     evidence::Found,
     examination::{Examination, Suited, examine, read_reference},
-    request::{Request, Sought},
+    references::read_bases,
+    request::{Request, Sought, lineage_of},
 };
 use crate::{
     Error, Result,
-    inputs::texts,
+    inputs::texts::{self, ReadRecord},
     progress::Progress,
     report::{Candidates, Entry, Report},
 };
 use meshmark_core::{
     key::SecretKey,
     message::Message,
-    options::{Options, Subject},
+    options::{Options, Spelling, Subject},
     recorded::Recorded,
 };
 use meshmark_dataset::Survey;
@@ -33,7 +34,7 @@ const MOST_LISTED: usize = 20;
 /// A record of the folder.
 struct Candidate {
     file: String,
-    record: Recorded,
+    read: ReadRecord,
     /// The options in the record.
     options: Options,
     /// The message in the record; none of a fingerprint.
@@ -93,7 +94,14 @@ pub fn verify_records(
     let mut of_group = Vec::new();
     for (group, reference) in of_references {
         let request = group.request(tried);
-        match examine(&request, &reference, progress)? {
+        let bases = match read_bases(&request, references) {
+            Err(Error::Dataset(lost)) => {
+                skip_all(&group, &lost.text(Spelling::Flag), &mut skip);
+                continue;
+            }
+            bases => bases?,
+        };
+        match examine(&request, (&reference, &bases), progress)? {
             Suited::Yes(seen) => {
                 of_group.push(group.candidates);
                 examined.push((request, seen));
@@ -111,7 +119,7 @@ pub fn verify_records(
     };
     let (template, seen) = &examined[best.place[0]];
     let chosen = Request {
-        record: Some(best.candidate.record.clone()),
+        record: Some(best.candidate.read.clone()),
         subject: best.candidate.options.subject.clone(),
         ..template.clone()
     };
@@ -135,21 +143,12 @@ fn these_are(files: &[String]) -> String {
 
 /// Reads all readable records, in the order of file names.
 fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) -> Result<Vec<Candidate>> {
-    let unreadable = |error: std::io::Error| Error::FolderUnread { path: folder.into(), source: error };
-    let mut files = Vec::new();
-    for entry in folder.read_dir().map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) && path.is_file() {
-            files.push(path);
-        }
-    }
-    files.sort();
     let mut candidates = Vec::new();
-    for path in files {
+    for path in texts::possible_records(folder)? {
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match texts::parsed_record(&path) {
             Err(bad) => skip(&file, bad.to_string()),
-            Ok(record) => match candidate(file.clone(), record, key) {
+            Ok(read) => match candidate(file.clone(), read, key) {
                 Ok(candidate) => candidates.push(candidate),
                 Err(other) => skip(&file, other.to_string()),
             },
@@ -159,14 +158,15 @@ fn read_all(folder: &Path, key: &SecretKey, skip: &mut dyn FnMut(&str, String)) 
 }
 
 /// Creates the candidate of a record that belongs to the key.
-fn candidate(file: String, record: Recorded, key: &SecretKey) -> Result<Candidate> {
-    check_key(&record, key)?;
-    let message = match &record {
+fn candidate(file: String, read: ReadRecord, key: &SecretKey) -> Result<Candidate> {
+    let record = &read.record;
+    check_key(record, key)?;
+    let message = match record {
         Recorded::Message(record) => Some(record.message()?),
         Recorded::Fingerprint(_) => None,
     };
     let options = record.options()?;
-    Ok(Candidate { file, record, options, message })
+    Ok(Candidate { file, options, message, read })
 }
 
 impl Candidate {
@@ -202,16 +202,21 @@ fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
         let (sought, Options { parameters, layers, srs, .. }) = (candidate.sought(), &candidate.options);
+        let lineage = lineage_of(&candidate.read.record);
         let same = |group: &&mut Group| {
             let r = &group.request;
-            r.parameters == *parameters && r.layers == *layers && r.srs == *srs && r.sought.is_like(&sought)
+            r.parameters == *parameters
+                && r.layers == *layers
+                && r.srs == *srs
+                && r.sought.is_like(&sought)
+                && r.lineage == lineage
         };
         if let Some(group) = groups.iter_mut().find(same) {
             group.candidates.push(candidate);
             continue;
         }
         let (parameters, layers, srs) = (parameters.clone(), layers.clone(), srs.clone());
-        let request = Request { parameters, layers, srs, sought, ..request.clone() };
+        let request = Request { parameters, layers, srs, sought, lineage, ..request.clone() };
         groups.push(Group { request, candidates: vec![candidate] });
     }
     groups
@@ -240,7 +245,7 @@ fn group_by_reference(
             }
         };
         let digest = reference.data.vertices.digest();
-        let (own, rest) = group.candidates.into_iter().partition(|c| is_made_from(&c.record, &digest));
+        let (own, rest) = group.candidates.into_iter().partition(|c| is_made_from(&c.read.record, &digest));
         group.candidates = rest;
         let own = Group { request, candidates: own };
         if !own.candidates.is_empty() {
@@ -392,6 +397,7 @@ fn listed(outcomes: &[Outcome], skipped: usize) -> Candidates {
         let is_match = outcome.answer.verdict == Verdict::Match;
         Entry {
             record: outcome.candidate.file.clone(),
+            sha256: outcome.candidate.read.sha256.clone(),
             recipient: outcome.candidate.recipient(),
             p_value_log10: disclosed::p_log10(outcome.answer.p_value_log10, is_match),
             bit_errors: outcome.bit_errors.filter(|_| is_match),

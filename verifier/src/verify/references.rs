@@ -5,8 +5,8 @@ use super::{
     examination::{Suited, read_reference},
     request::Request,
 };
-use crate::{Error, Result, progress::Progress};
-use meshmark_dataset::Survey;
+use crate::{Error, Result, inputs::maps, progress::Progress};
+use meshmark_dataset::{Bases, Survey};
 use std::path::PathBuf;
 
 /// Reads the only reference, or that of several from which the record of the request was made.
@@ -23,19 +23,27 @@ pub fn read_own_reference(
     if let [path] = references {
         let request = Request { reference: path.clone(), ..request.clone() };
         let reference = read_reference(&request, progress)?.or_fail()?;
-        if let Some(record) = &request.record {
-            check_reference(record, &request, &reference, &reference.data.vertices.digest())?;
+        if let Some(read) = &request.record {
+            check_reference(&read.record, &request, &reference, &reference.data.vertices.digest())?;
         }
         return Ok((request, reference));
     }
-    let Some(record) = &request.record else { return Err(Error::SeveralReferences) };
+    let Some(read) = &request.record else { return Err(Error::SeveralReferences) };
     for path in references {
         let request = Request { reference: path.clone(), ..request.clone() };
         if let Suited::Yes(reference) = read_reference(&request, progress)?
-            && is_made_from(record, &reference.data.vertices.digest())
+            && is_made_from(&read.record, &reference.data.vertices.digest())
         {
             return Ok((request, reference));
         }
     }
     Err(Error::NoReferenceOfRecord { references: references.len() })
+}
+
+/// Finds the editions that the record of a request rests on among the references.
+///
+/// # Errors
+/// Fails when a reference is unreadable, and when one is missing.
+pub fn read_bases(request: &Request, references: &[PathBuf]) -> Result<Bases> {
+    Bases::find(request.lineage.bases.clone(), references, &mut maps::base_reference)
 }

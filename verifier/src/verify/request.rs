@@ -1,12 +1,12 @@
 //! The request of a verification.
 
-use crate::inputs::private_copy::PrivateCopy;
+use crate::inputs::{private_copy::PrivateCopy, texts::ReadRecord};
 use meshmark_core::{
     key::SecretKey,
     options::{Parameters, Subject},
     recorded::Recorded,
 };
-use meshmark_dataset::LabelFields;
+use meshmark_dataset::{LabelFields, marking::Lineage};
 use meshmark_detection::{
     Demodulator, Mark, decision::Expected, matching::RadiusChoice, registration::Start,
 };
@@ -54,11 +54,14 @@ pub struct Request {
     /// The suspect map.
     pub suspect: PrivateCopy,
     /// The record that the driver wrote when it marked the map.
-    pub record: Option<Recorded>,
+    pub record: Option<ReadRecord>,
     /// The expected subject of the mark, if it is known.
     pub subject: Option<Subject>,
     /// What the mark carries.
     pub sought: Sought,
+    /// The parts of the fingerprint and the editions that it rests on, from a record that names
+    /// some.
+    pub lineage: Lineage,
     /// Number of the marks that are tried, this one included, as nobody recorded which it is.
     pub tried: usize,
     /// The parameters of the mark.
@@ -84,6 +87,16 @@ pub struct Request {
     pub evidence_map: bool,
     /// Whether these two hold the exact displacements of vertices.
     pub exact_displacements: bool,
+}
+
+/// Returns the lineage of a record that rests on earlier editions.
+pub fn lineage_of(record: &Recorded) -> Lineage {
+    match record {
+        Recorded::Fingerprint(record) if !record.bases.is_empty() => {
+            Lineage { parts: record.parts.clone(), bases: record.bases.clone() }
+        }
+        _ => Lineage::default(),
+    }
 }
 
 impl Request {

@@ -1,6 +1,9 @@
 //! The command as the tests of suspects run it.
 #![allow(dead_code)] // each test uses a part
 
+pub mod authority;
+pub mod deposits;
+
 use std::{
     fs,
     os::unix::fs::PermissionsExt,

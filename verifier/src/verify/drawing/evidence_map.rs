@@ -11,9 +11,9 @@ pub fn evidence_map(scene: &Scene, crs: Option<&CoordinateSystem>) -> EvidenceMa
     let reference = scene.matched.reference;
     let (coords, ground) = (scene.coords(), &reference.ground);
     let patches = reference.patches.as_slice();
-    let mut patch_of = vec![0; coords.len()];
+    let mut patch_of = vec![None; coords.len()];
     for (number, patch) in patches.iter().enumerate() {
-        patch.vertices.iter().for_each(|&v| patch_of[v as usize] = number);
+        patch.vertices.iter().for_each(|&v| patch_of[v as usize] = Some(number));
     }
     let of_patch = |patch: &Patch| PatchEvidence {
         vertices: patch.vertices.iter().map(|&v| coords[v as usize]).collect(),
@@ -26,14 +26,15 @@ pub fn evidence_map(scene: &Scene, crs: Option<&CoordinateSystem>) -> EvidenceMa
     let mut map = EvidenceMap { crs: crs.cloned(), vertices: Vec::new(), has_displacements, patches };
     let moved_m = scene.displacements_m();
     for (v, &weight) in scene.weights.iter().enumerate() {
-        let (Some(moved_m), at) = (moved_m[v], coords[v]) else { continue };
+        // Vertices that only follow others are in no patch.
+        let (Some(moved_m), Some(patch), at) = (moved_m[v], patch_of[v], coords[v]) else { continue };
         let unit = ground.metres_per_unit(at);
         let to = [at[0] + moved_m[0] / unit[0], at[1] + moved_m[1] / unit[1]];
         let displacement = has_displacements.then_some(ExactDisplacement { to, moved_m });
         // A weight follows from the length of the displacement.
         let weight = if has_displacements { weight } else { (10.0 * weight).round() / 10.0 };
-        map.vertices.push(FoundVertex { at, patch: patch_of[v], displacement, weight });
-        map.patches[patch_of[v]].found += 1;
+        map.vertices.push(FoundVertex { at, patch, displacement, weight });
+        map.patches[patch].found += 1;
     }
     map
 }
