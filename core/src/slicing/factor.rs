@@ -6,7 +6,7 @@
 //! certainty reads [`Factor::error_bounds`].
 
 use super::{
-    lanes::{LANES, Lanes, Real, one_row_at_a_time, product, subtract_product},
+    lanes::{LANES, Lanes, Real, add_product, one_row_at_a_time, product, subtract_product},
     matrix::SparseSymmetric,
     symbolic::{Panel, Symbolic, WIDEST_PANEL},
 };
@@ -17,14 +17,10 @@ const SCALED_PIVOTS: usize = 8;
 
 /// The factors of a batch.
 pub struct Factor<T> {
-    /// D.
-    pivots: Vec<Lanes<T>>,
     /// 1 / D.
     inverses: Vec<Lanes<T>>,
-    /// L.
-    lower: Vec<Lanes<T>>,
-    /// The columns of L D of the panel in work.
-    unscaled: [Vec<Lanes<T>>; WIDEST_PANEL],
+    /// L D, panel by panel.
+    entries: Vec<Lanes<T>>,
 }
 
 /// [`Factor::evaluate`], compiled for every instruction set.
@@ -41,7 +37,7 @@ impl<T: Real> WithSimd for Evaluation<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         self.factor.factorise(self.matrix, self.symbolic, self.shifts);
-        self.factor.inertias()
+        self.factor.inertias(self.symbolic)
     }
 }
 
@@ -60,12 +56,7 @@ impl<T: Real> Factor<T> {
     /// Makes room for the factors of a matrix.
     pub fn new(symbolic: &Symbolic, size: usize) -> Self {
         let zeros = |count| vec![[T::default(); LANES]; count];
-        Factor {
-            pivots: zeros(size),
-            inverses: zeros(size),
-            lower: zeros(symbolic.entries()),
-            unscaled: std::array::from_fn(|_| zeros(symbolic.longest_column())),
-        }
+        Factor { inverses: zeros(size), entries: zeros(symbolic.entries()) }
     }
 
     /// Factorises A − σ and returns inertia and determinant of every shift.
@@ -84,116 +75,81 @@ impl<T: Real> Factor<T> {
         self.load(matrix, symbolic, shifts);
         let mut targets = symbolic.targets();
         for panel in symbolic.panels() {
-            self.factorise_panel(symbolic, *panel);
-            targets = match panel.width {
-                1 => self.update::<1>(symbolic, panel.first, targets),
-                2 => self.update::<2>(symbolic, panel.first, targets),
-                3 => self.update::<3>(symbolic, panel.first, targets),
-                _ => self.update::<WIDEST_PANEL>(symbolic, panel.first, targets),
-            };
-        }
-    }
-
-    /// Factorises the columns of a panel.
-    #[inline(always)]
-    fn factorise_panel(&mut self, symbolic: &Symbolic, Panel { first, width }: Panel) {
-        for step in first..first + width {
-            let inverse = self.invert_pivot(step);
-            let (start, rows) = symbolic.column(step);
-            let unscaled = &mut self.unscaled[step - first];
-            for (scaled, unscaled) in
-                self.lower[start..start + rows.len()].iter_mut().zip(unscaled.iter_mut())
-            {
-                *unscaled = *scaled;
-                *scaled = product(scaled, &inverse);
-            }
-            for (b, later) in (step + 1..first + width).enumerate() {
-                let entry = unscaled[b];
-                subtract_product(&mut self.pivots[later], &self.lower[start + b], &entry);
-                let (next, rows) = symbolic.column(later);
-                let (head, tail) = self.lower.split_at_mut(next);
-                for (target, scaled) in tail[..rows.len()].iter_mut().zip(&head[start + b + 1..]) {
-                    subtract_product(target, scaled, &entry);
-                }
-            }
-        }
-    }
-
-    /// Subtracts the products of the W columns of a panel from the entries to its right, and
-    /// returns the targets of the next panel.
-    #[inline(always)]
-    fn update<'a, const W: usize>(
-        &mut self,
-        symbolic: &Symbolic,
-        first: usize,
-        mut targets: &'a [u32],
-    ) -> &'a [u32] {
-        let (start, rows) = symbolic.column(first + W - 1);
-        let end = start + rows.len();
-        let (head, tail) = self.lower.split_at_mut(end);
-        let scaled = below_panel::<T, W>(head, symbolic, first);
-        for (b, &row) in rows.iter().enumerate() {
-            let mut entries = [[T::default(); LANES]; W];
-            for c in 0..W {
-                entries[c] = self.unscaled[c][W - 1 - c + b];
-            }
-            let mut pivot = self.pivots[row as usize];
-            for c in 0..W {
-                subtract_product(&mut pivot, &scaled[c][b], &entries[c]);
-            }
-            self.pivots[row as usize] = pivot;
-            let (own, rest) = targets.split_at(rows.len() - b - 1);
-            for (i, target) in own.iter().enumerate() {
-                let target = &mut tail[*target as usize - end];
-                let mut sum = *target;
-                for c in 0..W {
-                    subtract_product(&mut sum, &scaled[c][b + 1 + i], &entries[c]);
-                }
-                *target = sum;
+            let rows = symbolic.rows(panel).len();
+            let (own, rest) = targets.split_at(rows * (rows + 1) / 2);
+            match panel.width {
+                1 => self.eliminate::<1>(panel, own),
+                2 => self.eliminate::<2>(panel, own),
+                3 => self.eliminate::<3>(panel, own),
+                _ => self.eliminate::<WIDEST_PANEL>(panel, own),
             }
             targets = rest;
         }
-        targets
     }
 
     /// Fills the factor with A − σ.
     #[inline(always)]
     fn load(&mut self, matrix: &SparseSymmetric, symbolic: &Symbolic, shifts: &Lanes<f64>) {
-        for (pivot, diagonal) in self.pivots.iter_mut().zip(matrix.diagonal()) {
-            one_row_at_a_time();
-            for lane in 0..LANES {
-                pivot[lane] = T::rounded(diagonal - shifts[lane]);
-            }
-        }
-        self.lower.fill([T::default(); LANES]);
+        self.entries.fill([T::default(); LANES]);
         for &(place, value) in &symbolic.own {
-            self.lower[place as usize] = [T::rounded(value); LANES];
+            self.entries[place as usize] = [T::rounded(value); LANES];
+        }
+        for (place, diagonal) in symbolic.diagonal().iter().zip(matrix.diagonal()) {
+            one_row_at_a_time();
+            let mut entry = [T::default(); LANES];
+            for lane in 0..LANES {
+                entry[lane] = T::rounded(diagonal - shifts[lane]);
+            }
+            self.entries[*place as usize] = entry;
         }
     }
 
-    /// Keeps the pivot of a step away from 0, and inverts it.
+    /// Factorises a panel of W columns, and subtracts their products from the entries to its right.
     #[inline(always)]
-    fn invert_pivot(&mut self, step: usize) -> Lanes<T> {
-        let pivot = &mut self.pivots[step];
-        let inverse = &mut self.inverses[step];
-        for lane in 0..LANES {
-            let least = T::LEAST_PIVOT;
-            let is_small = pivot[lane] < least && -pivot[lane] < least;
-            pivot[lane] = if is_small { least } else { pivot[lane] };
-            inverse[lane] = T::ONE / pivot[lane];
+    fn eliminate<const W: usize>(&mut self, panel: &Panel, targets: &[u32]) {
+        let [start, end] = panel.entries;
+        let (before, right) = self.entries.split_at_mut(end);
+        let (rows, _) = before[start..].as_chunks_mut::<W>();
+        let inverses: &mut [Lanes<T>; W] =
+            (&mut self.inverses[panel.first..][..W]).try_into().expect("W columns");
+        let (own, below) = rows.split_at_mut(W);
+        let factors = triangle(own.try_into().expect("W rows"), inverses);
+        for row in below.iter_mut() {
+            one_row_at_a_time();
+            *row = reduced(row, &factors);
         }
-        *inverse
+        let mut below = &*below;
+        let mut targets = targets;
+        while let Some(first) = below.first() {
+            let mut factors = *first;
+            for c in 0..W {
+                factors[c] = product(&first[c], &inverses[c]);
+            }
+            let (own, rest) = targets.split_at(below.len());
+            for (target, row) in own.iter().zip(below) {
+                one_row_at_a_time();
+                let target = &mut right[*target as usize - end];
+                let mut sum = *target;
+                for c in 0..W {
+                    subtract_product(&mut sum, &row[c], &factors[c]);
+                }
+                *target = sum;
+            }
+            targets = rest;
+            below = &below[1..];
+        }
     }
 
     /// Returns inertia and determinant of every shift.
     #[inline(always)]
-    fn inertias(&self) -> Lanes<Inertia> {
+    fn inertias(&self, symbolic: &Symbolic) -> Lanes<Inertia> {
         let mut below = [0u64; LANES];
         let mut products = [1.0f64; LANES];
         let mut exponents = [0i64; LANES];
-        for pivots in self.pivots.chunks(SCALED_PIVOTS) {
-            for pivot in pivots {
+        for places in symbolic.diagonal().chunks(SCALED_PIVOTS) {
+            for place in places {
                 one_row_at_a_time();
+                let pivot = &self.entries[*place as usize];
                 for lane in 0..LANES {
                     products[lane] *= pivot[lane].double();
                     below[lane] += pivot[lane].double().to_bits() >> 63;
@@ -219,20 +175,19 @@ impl<T: Real> Factor<T> {
     /// semidefinite matrix is at most its trace.
     pub fn error_bounds(&self, symbolic: &Symbolic) -> Lanes<f64> {
         let mut traces = [0.0; LANES];
-        for (column, pivot) in self.pivots.iter().enumerate() {
-            let (start, rows) = symbolic.column(column);
-            let mut squares = [1.0; LANES];
-            for entry in &self.lower[start..start + rows.len()] {
-                for lane in 0..LANES {
-                    let value = entry[lane].double();
-                    squares[lane] += value * value;
+        for panel in symbolic.panels() {
+            let [start, end] = panel.entries;
+            for (row, entries) in self.entries[start..end].chunks(panel.width).enumerate() {
+                for (c, entry) in entries.iter().enumerate().take(row + 1) {
+                    let inverse = &self.inverses[panel.first + c];
+                    for lane in 0..LANES {
+                        let value = entry[lane].double();
+                        traces[lane] += value * value * inverse[lane].double().abs();
+                    }
                 }
             }
-            for lane in 0..LANES {
-                traces[lane] += squares[lane] * pivot[lane].double().abs();
-            }
         }
-        traces.map(|trace| (self.pivots.len() + 10) as f64 * f64::EPSILON * trace)
+        traces.map(|trace| (self.inverses.len() + 10) as f64 * f64::EPSILON * trace)
     }
 
     /// Solves (A − σ) z = b in place.
@@ -240,83 +195,127 @@ impl<T: Real> Factor<T> {
     pub fn solve(&self, symbolic: &Symbolic, vectors: &mut [Lanes<T>]) {
         for panel in symbolic.panels() {
             match panel.width {
-                1 => self.forward::<1>(symbolic, panel.first, vectors),
-                2 => self.forward::<2>(symbolic, panel.first, vectors),
-                3 => self.forward::<3>(symbolic, panel.first, vectors),
-                _ => self.forward::<WIDEST_PANEL>(symbolic, panel.first, vectors),
+                1 => self.forward::<1>(symbolic, panel, vectors),
+                2 => self.forward::<2>(symbolic, panel, vectors),
+                3 => self.forward::<3>(symbolic, panel, vectors),
+                _ => self.forward::<WIDEST_PANEL>(symbolic, panel, vectors),
             }
         }
         for panel in symbolic.panels().iter().rev() {
             match panel.width {
-                1 => self.backward::<1>(symbolic, panel.first, vectors),
-                2 => self.backward::<2>(symbolic, panel.first, vectors),
-                3 => self.backward::<3>(symbolic, panel.first, vectors),
-                _ => self.backward::<WIDEST_PANEL>(symbolic, panel.first, vectors),
+                1 => self.backward::<1>(symbolic, panel, vectors),
+                2 => self.backward::<2>(symbolic, panel, vectors),
+                3 => self.backward::<3>(symbolic, panel, vectors),
+                _ => self.backward::<WIDEST_PANEL>(symbolic, panel, vectors),
             }
         }
     }
 
+    /// Returns 1 / D of a panel, its own rows and those below it.
+    #[inline(always)]
+    fn panel<const W: usize>(
+        &self,
+        panel: &Panel,
+    ) -> (&[Lanes<T>; W], &[[Lanes<T>; W]; W], &[[Lanes<T>; W]]) {
+        let inverses = self.inverses[panel.first..].first_chunk().expect("W columns");
+        let (rows, _) = self.entries[panel.entries[0]..panel.entries[1]].as_chunks::<W>();
+        let (own, below) = rows.split_first_chunk().expect("W rows");
+        (inverses, own, below)
+    }
+
     /// Solves L D y = b for the rows of a panel, and takes them out of the rows below it.
     #[inline(always)]
-    fn forward<const W: usize>(&self, symbolic: &Symbolic, first: usize, vectors: &mut [Lanes<T>]) {
-        let mut known = [[T::default(); LANES]; W];
+    fn forward<const W: usize>(&self, symbolic: &Symbolic, panel: &Panel, vectors: &mut [Lanes<T>]) {
+        let (inverses, own, below) = self.panel::<W>(panel);
+        let known: &mut [Lanes<T>; W] = vectors[panel.first..].first_chunk_mut().expect("W rows");
+        let mut solved = *known;
         for c in 0..W {
-            known[c] = vectors[first + c];
-            let (start, _) = symbolic.column(first + c);
-            for later in c + 1..W {
-                let entry = &self.lower[start + later - c - 1];
-                subtract_product(&mut vectors[first + later], entry, &known[c]);
+            for e in 0..c {
+                let earlier = solved[e];
+                subtract_product(&mut solved[c], &own[c][e], &earlier);
             }
-            vectors[first + c] = product(&known[c], &self.inverses[first + c]);
+            solved[c] = product(&solved[c], &inverses[c]);
         }
-        let (_, rows) = symbolic.column(first + W - 1);
-        let entries = below_panel::<T, W>(&self.lower, symbolic, first);
-        for (i, row) in rows.iter().enumerate() {
-            let mut sum = vectors[*row as usize];
+        *known = solved;
+        for (row, entries) in symbolic.rows(panel).iter().zip(below) {
+            one_row_at_a_time();
+            let vector = &mut vectors[*row as usize];
+            let mut sum = *vector;
             for c in 0..W {
-                subtract_product(&mut sum, &entries[c][i], &known[c]);
+                subtract_product(&mut sum, &entries[c], &solved[c]);
             }
-            vectors[*row as usize] = sum;
+            *vector = sum;
         }
     }
 
     /// Solves Lᵀ z = y for the rows of a panel.
     #[inline(always)]
-    fn backward<const W: usize>(&self, symbolic: &Symbolic, first: usize, vectors: &mut [Lanes<T>]) {
+    fn backward<const W: usize>(&self, symbolic: &Symbolic, panel: &Panel, vectors: &mut [Lanes<T>]) {
+        let (inverses, own, below) = self.panel::<W>(panel);
         let mut sums = [[T::default(); LANES]; W];
-        sums.copy_from_slice(&vectors[first..first + W]);
-        let (_, rows) = symbolic.column(first + W - 1);
-        let entries = below_panel::<T, W>(&self.lower, symbolic, first);
-        for (i, row) in rows.iter().enumerate() {
+        for (row, entries) in symbolic.rows(panel).iter().zip(below) {
+            one_row_at_a_time();
             let known = vectors[*row as usize];
             for c in 0..W {
-                subtract_product(&mut sums[c], &entries[c][i], &known);
+                subtract_product(&mut sums[c], &entries[c], &known);
             }
         }
+        let vectors: &mut [Lanes<T>; W] = vectors[panel.first..].first_chunk_mut().expect("W rows");
+        let mut solved = *vectors;
         for c in (0..W).rev() {
-            let (start, _) = symbolic.column(first + c);
-            for later in c + 1..W {
-                let known = vectors[first + later];
-                subtract_product(&mut sums[c], &self.lower[start + later - c - 1], &known);
+            for d in c + 1..W {
+                subtract_product(&mut sums[c], &own[d][c], &solved[d]);
             }
-            vectors[first + c] = sums[c];
+            add_product(&mut solved[c], &sums[c], &inverses[c]);
         }
+        *vectors = solved;
     }
 }
 
-/// Returns the entries of the W columns of a panel in the rows below it.
+/// Factorises the first rows of a panel, and returns their entries of L.
 #[inline(always)]
-fn below_panel<'a, T, const W: usize>(
-    lower: &'a [Lanes<T>],
-    symbolic: &Symbolic,
-    first: usize,
-) -> [&'a [Lanes<T>]; W] {
-    let mut columns: [&[Lanes<T>]; W] = [&[]; W];
-    for (c, column) in columns.iter_mut().enumerate() {
-        let (start, rows) = symbolic.column(first + c);
-        *column = &lower[start + W - 1 - c..start + rows.len()];
+fn triangle<T: Real, const W: usize>(
+    rows: &mut [[Lanes<T>; W]; W],
+    inverses: &mut [Lanes<T>; W],
+) -> [[Lanes<T>; W]; W] {
+    let mut factors = [[[T::default(); LANES]; W]; W];
+    for c in 0..W {
+        rows[c] = reduced(&rows[c], &factors);
+        let mut pivot = rows[c][c];
+        for e in 0..c {
+            factors[c][e] = product(&rows[c][e], &inverses[e]);
+            subtract_product(&mut pivot, &factors[c][e], &rows[c][e]);
+        }
+        (rows[c][c], inverses[c]) = inverted(pivot);
     }
-    columns
+    factors
+}
+
+/// Returns the entries of L D of a row of A − σ, by the entries of L above it. Where these are 0 the
+/// entry does not change.
+#[inline(always)]
+fn reduced<T: Real, const W: usize>(row: &[Lanes<T>; W], factors: &[[Lanes<T>; W]; W]) -> [Lanes<T>; W] {
+    let mut reduced = *row;
+    for c in 0..W {
+        for e in 0..c {
+            let earlier = reduced[e];
+            subtract_product(&mut reduced[c], &factors[c][e], &earlier);
+        }
+    }
+    reduced
+}
+
+/// Keeps a pivot away from 0, and returns it with its inverse.
+#[inline(always)]
+fn inverted<T: Real>(mut pivot: Lanes<T>) -> (Lanes<T>, Lanes<T>) {
+    for lane in 0..LANES {
+        pivot[lane] = pivot[lane].away_from_zero();
+    }
+    let mut inverse = [T::ONE; LANES];
+    for lane in 0..LANES {
+        inverse[lane] = inverse[lane] / pivot[lane];
+    }
+    (pivot, inverse)
 }
 
 #[cfg(test)]

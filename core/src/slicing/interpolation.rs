@@ -7,7 +7,11 @@
 //! P. Jarratt, *A modified regula falsi method for computing the root of an equation*, BIT 11,
 //! 1971).
 
-use super::isolation::{Node, Query};
+use super::{
+    isolation::{Node, Query},
+    lanes::{LANES, Lanes, sum},
+};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Nodes of a polynomial.
 const NODES: usize = 14;
@@ -19,16 +23,32 @@ const STEPS: usize = 30;
 const NARROW: f64 = 1e-5;
 
 /// A guess is good when a node is closer than this share of the distance to the next eigenvalue.
-const CLOSE: f64 = 3e-2;
+const CLOSE: f64 = 6e-2;
 /// Determinants between eigenvalues closer than this, relative to the norm of the matrix, are
 /// computed in double precision.
 const NARROW_GAP: f64 = 1e-4;
 
 /// Returns guesses of the eigenvalues after the nodes `brackets`.
 pub fn guesses(nodes: &[Node], brackets: &[usize]) -> Vec<f64> {
-    let ends = [brackets[0], brackets[brackets.len() - 1] + 1].map(|node| nodes[node].shift);
-    let spacing = (ends[1] - ends[0]) / brackets.len() as f64;
-    brackets.iter().map(|&first| root(nodes, first, spacing)).collect()
+    Arch::new().dispatch(Guessing { nodes, brackets })
+}
+
+/// [`guesses`], compiled for every instruction set.
+struct Guessing<'a> {
+    nodes: &'a [Node],
+    brackets: &'a [usize],
+}
+
+impl WithSimd for Guessing<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
+        let Guessing { nodes, brackets } = self;
+        let ends = [brackets[0], brackets[brackets.len() - 1] + 1].map(|node| nodes[node].shift);
+        let spacing = (ends[1] - ends[0]) / brackets.len() as f64;
+        brackets.iter().map(|&first| root(nodes, first, spacing)).collect()
+    }
 }
 
 /// Returns the guesses of eigenvalues after the nodes `brackets` that no node is close to.
@@ -50,6 +70,7 @@ pub fn queries(nodes: &[Node], brackets: &[usize], norm: f64) -> Vec<Query> {
 
 /// Returns a guess of the only eigenvalue between node `first` and the next one, where eigenvalues
 /// have a mean distance of `spacing`.
+#[inline(always)]
 fn root(nodes: &[Node], first: usize, spacing: f64) -> f64 {
     let polynomial = Polynomial::through(nodes, first, spacing);
     let [mut a, mut b] = [nodes[first].shift, nodes[first + 1].shift];
@@ -81,31 +102,41 @@ fn root(nodes: &[Node], first: usize, spacing: f64) -> f64 {
     last
 }
 
-/// A polynomial without the factor that has no root in the bracket.
+/// A polynomial without the factor that has no root in the bracket. What is left of the arrays
+/// behind the last node adds nothing.
 struct Polynomial {
     /// The shifts of the nodes, the ends of the bracket first.
-    shifts: [f64; NODES],
+    shifts: Lanes<f64>,
     /// Determinants over the products of the distances to the other nodes.
-    weighted: [f64; NODES],
+    weighted: Lanes<f64>,
 }
 
 impl Polynomial {
+    #[inline(always)]
     fn through(nodes: &[Node], first: usize, spacing: f64) -> Self {
-        let around = around(nodes, first, spacing);
-        let trend = Trend::of(&around);
+        let (around, count) = around(nodes, first, spacing);
+        let around = &around[..count];
+        let trend = Trend::of(around);
         let scale = 1.0 / spacing;
-        let mut polynomial = Polynomial { shifts: [f64::INFINITY; NODES], weighted: [0.0; NODES] };
-        for (i, node) in around.iter().enumerate() {
-            let distance = |other: &&Node| (node.shift - other.shift) * scale;
-            let others = around.iter().enumerate().filter(|(j, _)| *j != i);
-            let product: f64 = others.map(|(_, other)| distance(other)).product();
-            polynomial.shifts[i] = node.shift;
-            polynomial.weighted[i] = trend.taken_from(node) / product;
+        let mut shifts = [f64::INFINITY; LANES];
+        around.iter().zip(&mut shifts).for_each(|(node, shift)| *shift = node.shift);
+        let mut products = [1.0; LANES];
+        for (number, node) in around.iter().enumerate() {
+            for lane in 0..LANES {
+                let distance = (shifts[lane] - node.shift) * scale;
+                products[lane] *= if lane == number { 1.0 } else { distance };
+            }
         }
-        polynomial
+        let mut weighted = [0.0; LANES];
+        around.iter().zip(&mut weighted).for_each(|(node, value)| *value = trend.taken_from(node));
+        for lane in 0..LANES {
+            weighted[lane] /= products[lane];
+        }
+        Polynomial { shifts, weighted }
     }
 
     /// Returns the value at x, times a function that has one sign in the bracket.
+    #[inline(always)]
     fn near(&self, x: f64) -> f64 {
         let [a, b] = [self.shifts[0], self.shifts[1]];
         if x == a {
@@ -114,22 +145,25 @@ impl Polynomial {
         if x == b {
             return -self.weighted[1] * (b - a);
         }
-        let mut sum = 0.0;
-        for (shift, weighted) in self.shifts.iter().zip(&self.weighted) {
-            sum += weighted / (x - shift);
+        let mut terms = self.weighted;
+        for lane in 0..LANES {
+            terms[lane] /= x - self.shifts[lane];
         }
-        sum * (x - a) * (b - x)
+        sum(terms) * (x - a) * (b - x)
     }
 }
 
-/// Returns the nodes of the polynomial for the bracket after node `first`: its ends, then the
-/// nearest ones on either side in turn. Two nodes close to each other would turn the rounding of
-/// their determinants into a wrong slope.
-fn around(nodes: &[Node], first: usize, spacing: f64) -> Vec<&Node> {
-    let mut around = vec![&nodes[first], &nodes[first + 1]];
+/// Returns the nodes of the polynomial for the bracket after node `first`, and their number: its
+/// ends, then the nearest ones on either side in turn. Two nodes close to each other would turn the
+/// rounding of their determinants into a wrong slope.
+#[inline(always)]
+fn around(nodes: &[Node], first: usize, spacing: f64) -> ([Node; NODES], usize) {
+    let mut around = [Node::default(); NODES];
+    (around[0], around[1]) = (nodes[first], nodes[first + 1]);
+    let mut count = 2;
     let mut last = [first, first + 1];
     let least = CROWDED * spacing;
-    while around.len() < NODES {
+    while count < NODES {
         let [low, high] = last.map(|i| nodes[i].shift);
         let below = nodes[..last[0]].iter().rposition(|node| node.shift < low - least);
         let above = nodes[last[1] + 1..].iter().position(|node| node.shift > high + least);
@@ -137,14 +171,14 @@ fn around(nodes: &[Node], first: usize, spacing: f64) -> Vec<&Node> {
             break;
         }
         for (side, next) in [below, above.map(|i| last[1] + 1 + i)].into_iter().enumerate() {
-            if let Some(next) = next {
-                around.push(&nodes[next]);
+            if let (Some(next), true) = (next, count < NODES) {
+                around[count] = nodes[next];
+                count += 1;
                 last[side] = next;
             }
         }
     }
-    around.truncate(NODES);
-    around
+    (around, count)
 }
 
 /// The exponential trend of the determinant, 2^(`mean` + `slope` (σ − `middle`)): most eigenvalues
@@ -156,10 +190,11 @@ struct Trend {
 }
 
 impl Trend {
-    fn of(nodes: &[&Node]) -> Self {
+    #[inline(always)]
+    fn of(nodes: &[Node]) -> Self {
         let count = nodes.len() as f64;
         let middle = nodes.iter().map(|node| node.shift).sum::<f64>() / count;
-        let mean = nodes.iter().map(|node| logarithm(node)).sum::<f64>() / count;
+        let mean = nodes.iter().map(logarithm).sum::<f64>() / count;
         let [mut covariance, mut variance] = [0.0; 2];
         for node in nodes {
             let distance = node.shift - middle;
@@ -170,6 +205,7 @@ impl Trend {
     }
 
     /// Returns the determinant at a node over the trend.
+    #[inline(always)]
     fn taken_from(&self, node: &Node) -> f64 {
         let exponent = f64::from(node.inertia.exponent) - self.mean - self.slope * (node.shift - self.middle);
         let size = node.inertia.mantissa * power_of_two(exponent);
@@ -178,11 +214,13 @@ impl Trend {
 }
 
 /// Returns approximately the binary logarithm of the determinant.
+#[inline(always)]
 fn logarithm(node: &Node) -> f64 {
     f64::from(node.inertia.exponent) + node.inertia.mantissa - 1.0
 }
 
 /// Returns approximately 2^x, a smooth function that has the same bits on all machines.
+#[inline(always)]
 fn power_of_two(x: f64) -> f64 {
     let root = 1.0 + x.clamp(-500.0, 500.0) * (std::f64::consts::LN_2 / 1024.0);
     (0..10).fold(root, |power, _| power * power)

@@ -32,6 +32,9 @@ pub trait Real:
 
     /// Returns the same number in double precision.
     fn double(self) -> f64;
+
+    /// Returns the number, or [`Real::LEAST_PIVOT`] when it is closer to 0.
+    fn away_from_zero(self) -> Self;
 }
 
 impl Real for f32 {
@@ -46,6 +49,11 @@ impl Real for f32 {
     #[inline(always)]
     fn double(self) -> f64 {
         f64::from(self)
+    }
+
+    #[inline(always)]
+    fn away_from_zero(self) -> Self {
+        if self.abs() < Self::LEAST_PIVOT { Self::LEAST_PIVOT } else { self }
     }
 }
 
@@ -62,6 +70,11 @@ impl Real for f64 {
     fn double(self) -> f64 {
         self
     }
+
+    #[inline(always)]
+    fn away_from_zero(self) -> Self {
+        if self.abs() < Self::LEAST_PIVOT { Self::LEAST_PIVOT } else { self }
+    }
 }
 
 /// Takes the product of two lanes away from a third.
@@ -74,9 +87,9 @@ pub fn subtract_product<T: Real>(from: &mut Lanes<T>, a: &Lanes<T>, b: &Lanes<T>
 
 /// Adds the product of two lanes to a third.
 #[inline(always)]
-pub fn add_product(to: &mut Lanes<f64>, a: &Lanes<f64>, b: &Lanes<f64>) {
+pub fn add_product<T: Real>(to: &mut Lanes<T>, a: &Lanes<T>, b: &Lanes<T>) {
     for lane in 0..LANES {
-        to[lane] += a[lane] * b[lane];
+        to[lane] = to[lane] + a[lane] * b[lane];
     }
 }
 
@@ -88,6 +101,17 @@ pub fn product<T: Real>(a: &Lanes<T>, b: &Lanes<T>) -> Lanes<T> {
         product[lane] = product[lane] * b[lane];
     }
     product
+}
+
+/// Returns the sum of all lanes.
+#[inline(always)]
+pub fn sum(mut lanes: Lanes<f64>) -> f64 {
+    for half in [8, 4, 2, 1] {
+        for lane in 0..half {
+            lanes[lane] += lanes[lane + half];
+        }
+    }
+    lanes[0]
 }
 
 /// Returns the same numbers in double precision.

@@ -19,7 +19,7 @@ const MOST_ENTRIES: usize = 48;
 /// are eliminated first would be near 0. Sizes are relative to the norm of the matrix.
 const LEAST_PIVOT: f64 = 1e-5;
 /// Shifts as near as this to such an entry are factorised in double precision.
-const DELICATE: f64 = 0.01;
+const DELICATE: f64 = 0.005;
 /// A vector with a residual larger than this is iterated again, in double precision.
 const LARGE_RESIDUAL: f64 = 2.0 * SMALL_RESIDUAL;
 /// An eigenvalue may lie outside of the shifts around it by this much.
