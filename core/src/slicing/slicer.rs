@@ -22,6 +22,8 @@ const LEAST_PIVOT: f64 = 1e-5;
 const DELICATE: f64 = 0.005;
 /// A vector with a residual larger than this is iterated again, in double precision.
 const LARGE_RESIDUAL: f64 = 2.0 * SMALL_RESIDUAL;
+/// A value with a residual smaller than this is a better guess than that by interpolation.
+const SETTLED: f64 = 1e-7;
 /// An eigenvalue may lie outside of the shifts around it by this much.
 const ROUNDING: f64 = 1e-5;
 /// Improvements of a vector in single precision: what needs more is iterated in double precision.
@@ -119,7 +121,8 @@ impl Slicer {
         let (mut rest, plain): (Vec<Target>, Vec<Target>) =
             targets.partition(|target| problem.is_delicate(target.guess));
         problem.iterate(single, &plain, SINGLE_STEPS, &mut solution);
-        rest.extend(plain.iter().filter(|target| !problem.is_accurate(target, &solution)));
+        let inaccurate = plain.iter().filter(|target| !problem.is_accurate(target, &solution));
+        rest.extend(inaccurate.map(|target| problem.improved(target, &solution)));
         problem.iterate(double, &rest, DOUBLE_STEPS, &mut solution);
         rest.retain(|target| !problem.is_accurate(target, &solution));
         problem.halve(double, &mut rest);
@@ -165,12 +168,25 @@ impl Problem {
         self.above_diagonal(shift).abs() < DELICATE * self.norm
     }
 
-    /// Returns whether the solution has the eigenvalue between the shifts around it.
     fn is_accurate(&self, target: &Target, solution: &Solution) -> bool {
+        self.is_found(target, solution, LARGE_RESIDUAL)
+    }
+
+    /// Returns whether the solution has the eigenvalue between the shifts around it, with a residual
+    /// smaller than `residual`.
+    fn is_found(&self, target: &Target, solution: &Solution, residual: f64) -> bool {
         let [low, high] = target.bracket;
         let (value, margin) = (solution.values[target.number], ROUNDING * self.norm);
         let is_inside = low - margin < value && value < high + margin;
-        is_inside && solution.residuals[target.number] < LARGE_RESIDUAL * self.norm
+        is_inside && solution.residuals[target.number] < residual * self.norm
+    }
+
+    /// Returns a target with the value found as its guess, when that is close to the eigenvalue.
+    fn improved(&self, target: &Target, solution: &Solution) -> Target {
+        match self.is_found(target, solution, SETTLED) {
+            true => Target { guess: self.clear(solution.values[target.number]), ..*target },
+            false => *target,
+        }
     }
 
     fn add_nodes<T: Real>(&self, factor: &mut Factor<T>, queries: &[Query], nodes: &mut Vec<Node>) {
