@@ -23,6 +23,9 @@ pub struct Factor<T> {
     entries: Vec<Lanes<T>>,
 }
 
+/// The first rows of a panel of W columns.
+type Rows<T, const W: usize> = [[Lanes<T>; W]; W];
+
 /// [`Factor::evaluate`], compiled for every instruction set.
 struct Evaluation<'a, T> {
     factor: &'a mut Factor<T>,
@@ -213,10 +216,7 @@ impl<T: Real> Factor<T> {
 
     /// Returns 1 / D of a panel, its own rows and those below it.
     #[inline(always)]
-    fn panel<const W: usize>(
-        &self,
-        panel: &Panel,
-    ) -> (&[Lanes<T>; W], &[[Lanes<T>; W]; W], &[[Lanes<T>; W]]) {
+    fn panel<const W: usize>(&self, panel: &Panel) -> (&[Lanes<T>; W], &Rows<T, W>, &[[Lanes<T>; W]]) {
         let inverses = self.inverses[panel.first..].first_chunk().expect("W columns");
         let (rows, _) = self.entries[panel.entries[0]..panel.entries[1]].as_chunks::<W>();
         let (own, below) = rows.split_first_chunk().expect("W rows");

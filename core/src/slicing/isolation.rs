@@ -16,8 +16,11 @@ const ROUNDS: usize = 14;
 /// Counts between shifts closer than this are made in double precision. Sizes are relative to the
 /// norm of the matrix.
 const NARROW: f64 = 1e-4;
-/// A matrix with more narrow gaps than this has too many eigenvalues that nearly agree.
+/// A matrix with more narrow gaps than this has too many eigenvalues that nearly agree; a share of
+/// the wanted eigenvalues comes on top.
 const MOST_NARROW: usize = 12;
+/// See [`MOST_NARROW`]: one in so many.
+const NARROW_SHARE: usize = 8;
 /// Eigenvalues closer than this are not isolated.
 const LEAST_GAP: f64 = 1e-6;
 
@@ -97,7 +100,7 @@ fn queries(nodes: &[Node], wanted: usize, norm: f64, round: usize) -> Option<Vec
         let [low, high] = [pair[0].shift, pair[1].shift];
         let is_narrow = high - low < NARROW * norm;
         narrow += usize::from(is_narrow && crowd > 1);
-        if high - low < LEAST_GAP * norm || narrow > MOST_NARROW {
+        if high - low < LEAST_GAP * norm || narrow > MOST_NARROW + wanted / NARROW_SHARE {
             return None;
         }
         let is_precise = is_narrow || round > ROUNDS / 2;

@@ -22,6 +22,8 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+    /// Whether it is single precision.
+    const IS_SINGLE: bool;
     /// 1.
     const ONE: Self;
     /// A pivot is never smaller than this.
@@ -38,6 +40,7 @@ pub trait Real:
 }
 
 impl Real for f32 {
+    const IS_SINGLE: bool = true;
     const ONE: Self = 1.0;
     const LEAST_PIVOT: Self = 1e-12;
 
@@ -58,6 +61,7 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    const IS_SINGLE: bool = false;
     const ONE: Self = 1.0;
     const LEAST_PIVOT: Self = 1e-30;
 
