@@ -23,8 +23,8 @@ pub struct Factor<T> {
     entries: Vec<Lanes<T>>,
 }
 
-/// The first rows of a panel of W columns.
-type Rows<T, const W: usize> = [[Lanes<T>; W]; W];
+/// 1 / D of a panel of W columns, its own rows, and those below it.
+type Parts<'a, T, const W: usize> = (&'a [Lanes<T>; W], &'a [[Lanes<T>; W]; W], &'a [[Lanes<T>; W]]);
 
 /// [`Factor::evaluate`], compiled for every instruction set.
 struct Evaluation<'a, T> {
@@ -216,7 +216,7 @@ impl<T: Real> Factor<T> {
 
     /// Returns 1 / D of a panel, its own rows and those below it.
     #[inline(always)]
-    fn panel<const W: usize>(&self, panel: &Panel) -> (&[Lanes<T>; W], &Rows<T, W>, &[[Lanes<T>; W]]) {
+    fn panel<const W: usize>(&self, panel: &Panel) -> Parts<'_, T, W> {
         let inverses = self.inverses[panel.first..].first_chunk().expect("W columns");
         let (rows, _) = self.entries[panel.entries[0]..panel.entries[1]].as_chunks::<W>();
         let (own, below) = rows.split_first_chunk().expect("W rows");
