@@ -81,6 +81,7 @@ pub mod series;
 pub mod sheet_plan;
 mod sides;
 pub mod signs;
+mod slicing;
 pub mod spectrum;
 pub mod stiffness;
 mod topology;

@@ -1,7 +1,12 @@
 //! The mesh spectrum of a patch: eigenvectors of its Laplacian, low frequencies first
 //! (paper, section 3.3).
 
-use crate::{Error, Result, patches::Patch, tridiagonal::Tridiagonal};
+use crate::{
+    Error, Result,
+    patches::Patch,
+    slicing::{self, SparseSymmetric},
+    tridiagonal::Tridiagonal,
+};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::evd::tridiag::{self, TridiagParams};
 use faer::linalg::{householder, qr};
@@ -42,7 +47,10 @@ impl Basis {
     /// # Errors
     /// [`Error::NoConvergence`], never seen on a real map.
     pub fn low_frequencies(patch: &Patch, count: usize) -> Result<Self> {
-        Self::with_solver(patch, count, solve)
+        let (laplacian, degrees) = laplacian(patch);
+        let solved = slicing::lowest(&laplacian, count, EQUAL_EIGENVALUES)
+            .or_else(|| tridiagonalise_and_solve(laplacian.to_dense(), count));
+        Self::of_solution(solved, degrees, count)
     }
 
     /// Solves with another symmetric eigen-solver, which takes L (n × n) and `count` and returns
@@ -55,14 +63,14 @@ impl Basis {
         count: usize,
         solver: impl Fn(Mat<f64>, usize) -> Option<(Vec<f64>, Mat<f64>)>,
     ) -> Result<Self> {
-        let n = patch.vertices.len();
-        let (laplacian, degrees) = match patch.weights.is_empty() {
-            true => symmetric_laplacian(patch),
-            false => (cotangent_laplacian(patch), vec![1.0; n]),
-        };
-        let (values, mut vectors) = solver(laplacian, count).ok_or(Error::NoConvergence { vertices: n })?;
+        let (laplacian, degrees) = laplacian(patch);
+        Self::of_solution(solver(laplacian.to_dense(), count), degrees, count)
+    }
+
+    fn of_solution(solved: Option<(Vec<f64>, Mat<f64>)>, degrees: Vec<f64>, count: usize) -> Result<Self> {
+        let (values, mut vectors) = solved.ok_or(Error::NoConvergence { vertices: degrees.len() })?;
         canonicalise(&values[..end_of_group(&values, count)], &mut vectors);
-        vectors.truncate(n, count);
+        vectors.truncate(degrees.len(), count);
         let norms_squared = to_unit_columns(&mut vectors, &degrees);
         Ok(Basis { vectors, eigenvalues: values[..count].to_vec(), degrees, norms_squared })
     }
@@ -96,47 +104,45 @@ impl Basis {
     }
 }
 
-/// Returns L = I − D^−½ A D^−½ (n × n) and the degrees D.
-fn symmetric_laplacian(patch: &Patch) -> (Mat<f64>, Vec<f64>) {
-    let n = patch.vertices.len();
-    let mut degrees = vec![0.0; n];
-    for [a, b] in &patch.edges {
-        degrees[*a as usize] += 1.0;
-        degrees[*b as usize] += 1.0;
+/// Returns the Laplacian (n × n) that the patch is marked with, and the degrees D.
+fn laplacian(patch: &Patch) -> (SparseSymmetric, Vec<f64>) {
+    match patch.weights.is_empty() {
+        true => symmetric_laplacian(patch),
+        false => (cotangent_laplacian(patch), vec![1.0; patch.vertices.len()]),
     }
-    let mut laplacian = Mat::identity(n, n);
-    for [a, b] in &patch.edges {
-        let (a, b) = (*a as usize, *b as usize);
-        let weight = -1.0 / f64::sqrt(degrees[a] * degrees[b]);
-        laplacian[(a, b)] = weight;
-        laplacian[(b, a)] = weight;
-    }
-    (laplacian, degrees)
 }
 
-/// Returns the Dirichlet Laplacian of a patch (n × n), −(cot α + cot β) off the diagonal and rows
-/// that sum to 0 (U. Pinkall, K. Polthier, *Computing discrete minimal surfaces and their
-/// conjugates*, Exp. Math. 2, 1993), divided by its largest diagonal entry: which eigenvalues are
-/// equal must not depend on the unit of the map.
-fn cotangent_laplacian(patch: &Patch) -> Mat<f64> {
-    let n = patch.vertices.len();
-    let mut laplacian = Mat::zeros(n, n);
-    for ([a, b], weight) in patch.edges.iter().zip(&patch.weights) {
-        let (a, b) = (*a as usize, *b as usize);
-        laplacian[(a, b)] = -weight;
-        laplacian[(b, a)] = -weight;
-        laplacian[(a, a)] += weight;
-        laplacian[(b, b)] += weight;
+/// Returns L = I − D^−½ A D^−½ and the degrees D.
+fn symmetric_laplacian(patch: &Patch) -> (SparseSymmetric, Vec<f64>) {
+    let mut degrees = vec![0.0; patch.vertices.len()];
+    patch.edges.iter().flatten().for_each(|row| degrees[*row as usize] += 1.0);
+    let weight = |[a, b]: [u32; 2]| -1.0 / f64::sqrt(degrees[a as usize] * degrees[b as usize]);
+    let off_diagonal = patch.edges.iter().map(|&edge| (edge, weight(edge)));
+    (SparseSymmetric::new(vec![1.0; degrees.len()], off_diagonal), degrees)
+}
+
+/// Returns the Dirichlet Laplacian of a patch, −(cot α + cot β) off the diagonal and rows that sum
+/// to 0 (U. Pinkall, K. Polthier, *Computing discrete minimal surfaces and their conjugates*, Exp.
+/// Math. 2, 1993), divided by its largest diagonal entry: which eigenvalues are equal must not
+/// depend on the unit of the map.
+fn cotangent_laplacian(patch: &Patch) -> SparseSymmetric {
+    let weighted = patch.edges.iter().zip(&patch.weights);
+    let mut diagonal = vec![0.0; patch.vertices.len()];
+    for ([a, b], weight) in weighted.clone() {
+        diagonal[*a as usize] += weight;
+        diagonal[*b as usize] += weight;
     }
-    let largest = (0..n).map(|v| laplacian[(v, v)]).fold(f64::MIN_POSITIVE, f64::max);
-    laplacian / faer::Scale(largest)
+    let scale = 1.0 / diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    diagonal.iter_mut().for_each(|entry| *entry *= scale);
+    SparseSymmetric::new(diagonal, weighted.map(|(&edge, weight)| (edge, -weight * scale)))
 }
 
 /// Solves for the lowest eigenvalues and eigenvectors of a symmetric matrix, as
 /// [`Basis::with_solver`] needs them: it tridiagonalises, solves the tridiagonal problem, and
 /// transforms only the resulting columns back. It uses one thread, so that the result does not
 /// depend on the number of threads.
-fn solve(mut matrix: Mat<f64>, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
+#[doc(hidden)]
+pub fn tridiagonalise_and_solve(mut matrix: Mat<f64>, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = matrix.nrows();
     let block = qr::no_pivoting::factor::recommended_block_size::<f64>(n, n);
     let params: Spec<TridiagParams, f64> = <TridiagParams as Auto<f64>>::auto().into();

@@ -323,7 +323,7 @@ fn away_from_zero(pivot: f64) -> f64 {
 /// Orthogonalises the vectors of eigenvalues closer than `close` by the process of Gram and
 /// Schmidt.
 #[inline(always)]
-fn orthogonalise(values: &[f64], vectors: &mut Mat<f64>, close: f64) {
+pub(crate) fn orthogonalise(values: &[f64], vectors: &mut Mat<f64>, close: f64) {
     for i in 1..values.len() {
         let first = values.partition_point(|value| *value <= values[i] - close);
         if first == i {

@@ -14,7 +14,7 @@ use meshmark_core::{
     message::Message,
     options::{Laplacian, Parameters},
     patches::{Patch, Patches},
-    spectrum::Basis,
+    spectrum::{Basis, tridiagonalise_and_solve},
     vertices::VertexTable,
 };
 use proptest::prelude::*;
@@ -342,6 +342,32 @@ fn another_solver_gives_the_same_basis_on_paths_cycles_stars_and_complete_graphs
         let patch = Patch { vertices: (0..n).collect(), edges, ..Patch::default() };
         for count in [2, 31, 32, 60] {
             assert!(largest_difference(&patch, count) < 1e-9, "{count}");
+        }
+    }
+}
+
+#[test]
+fn displacements_are_those_of_the_tridiagonal_solver() {
+    let hash = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31) % 1_000_003;
+    let scattered = (0..1300).map(|i| [hash(i) as f64 / 100.0, hash(i + 1300) as f64 / 100.0]).collect();
+    let scattered = VertexTable::new(scattered).unwrap();
+    for (table, patch_size) in
+        [(&scattered, 130), (&scattered, 480), (&scattered, 1300), (&grid(20), 400), (&clusters(), 448)]
+    {
+        for laplacian in [Laplacian::Biggs, Laplacian::Cotangent] {
+            let p = Parameters { basis: laplacian, patch_size, ..small() };
+            let patches = Patches::new(&Map::of_points(table, &Ground::METRES), &p).unwrap();
+            let patch = &patches.as_slice()[0];
+            let n = patch.vertices.len();
+            for count in [65, 129, n / 2, n - 1, n] {
+                let ours = Basis::low_frequencies(patch, count).unwrap();
+                let theirs = Basis::with_solver(patch, count, tridiagonalise_and_solve).unwrap();
+                let mark: Vec<f64> =
+                    (0..count).map(|i| if hash(i as u64) % 2 == 0 { 0.1 } else { -0.1 }).collect();
+                let [ours, theirs] = [ours, theirs].map(|basis| basis.synthesise(&mark));
+                let miss = ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(miss < 1e-9, "{laplacian:?} {patch_size} {count}: {miss}");
+            }
         }
     }
 }
