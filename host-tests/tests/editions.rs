@@ -69,7 +69,8 @@ fn a_recipient_who_is_new_to_the_series_has_a_fingerprint_in_old_parts_too() {
     let options = [&options[..], &["KEY=key.json", "RECORD=records/new.json"]].concat();
     let options: Vec<&str> = options.iter().flat_map(|option| ["-oo", option]).collect();
     host.run("ogr2ogr", &[&["-f", "GPKG", "new.gpkg", "MESHMARK:3.gpkg"], &options[..]].concat()).succeeds();
-    let report = host.matches("3.gpkg", &[&ALL[..], &["--records", "records", "--show-recipients", "new.gpkg"]].concat());
+    let report = host
+        .matches("3.gpkg", &[&ALL[..], &["--records", "records", "--show-recipients", "new.gpkg"]].concat());
     let list = report["candidates"]["list"].as_array().unwrap();
     assert_eq!((&list[0]["recipient"], list.len()), (&"New Ltd".into(), 2));
     assert!(list[1]["p_value_log10"].as_f64().unwrap() > -6.0, "{report:#}");
