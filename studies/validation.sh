@@ -52,7 +52,7 @@ $("$tools/meshmark" --version) on these maps, of which [evaluation.md](evaluatio
 |---|---|
 $(for map in "$@"; do echo "| $(basename "$map") | $(sha256sum "$map" | cut -d ' ' -f 1) |"; done)
 
-Studies and sizes are those that fit the time that was there; the command of each is given. \`MAPS\`,
+The command of each study is given, with its size; these are small. \`MAPS\`,
 \`STUDIES\` and the sizes in \`studies/validation.sh\` choose others. [Evaluation](evaluation.md) has larger
 runs of the studies of [false alarms](evaluation.md#false-alarms) and [misses](evaluation.md#misses), and
 [security](security.md) those of coalitions.
