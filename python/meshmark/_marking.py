@@ -1,6 +1,8 @@
 """Marking."""
 
 import warnings
+from collections.abc import Callable
+from typing import Any, Optional
 
 import pyproj
 
@@ -21,7 +23,18 @@ OPTIONS = (
 )
 
 
-def mark(layers, key, *, recipient=None, message=None, srs=None, geometry=None, threads=None, progress=None, **options):
+def mark(
+    layers: Any,
+    key: _meshmark.Key,
+    *,
+    recipient: Optional[str] = None,
+    message: Optional[str] = None,
+    srs: Optional[str] = None,
+    geometry: Optional[str] = None,
+    threads: Optional[int] = None,
+    progress: Optional[Callable[[int, int], object]] = None,
+    **options: Any,
+) -> tuple[Any, _meshmark.Record]:
     """Mark a map.
 
     Parameters
