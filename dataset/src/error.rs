@@ -44,6 +44,7 @@ pub enum Error {
     SheetsOfOtherTolerance { plan: String, made_with: f64, given: f64 },
     SheetsInOtherCrs { plan: String, planned: String, own: String },
     SheetNotPlanned { plan: String },
+    SheetsWithPrecision { plan: String },
     Gdal(GdalError),
     Map(meshmark_marking::Error),
 }
@@ -296,6 +297,13 @@ impl Error {
                 "{} is of sheets in another CRS ({planned}) than this map ({own}): mark sheets in the CRS in which they \
                  were planned",
                 sheets(plan)
+            ),
+            Error::SheetsWithPrecision { plan } => format!(
+                "{} keeps what sheets share in place, and {} would round it: leave {} out, and round the whole map \
+                 before it is cut into sheets",
+                sheets(plan),
+                spelling.name("PRECISION"),
+                spelling.name("PRECISION")
             ),
             Error::SheetNotPlanned { plan } => format!(
                 "{} has no sheet with the vertices of this map: plan all sheets again if one of them has changed, with \

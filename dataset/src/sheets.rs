@@ -7,7 +7,8 @@ use std::{fs::File, path::Path};
 /// Returns the anchors of a map by the plan that options name; none without a plan.
 ///
 /// # Errors
-/// Fails on a plan that is unreadable, of another TOLERANCE or CRS, or without this map.
+/// Fails on a plan that is unreadable, of another TOLERANCE or CRS, or without this map, and where PRECISION
+/// would move the anchors.
 pub(crate) fn anchors(options: &Options, map: &Survey) -> Result<Anchors> {
     let Some(path) = &options.sheets else { return Ok(Anchors::default()) };
     let plan = || path.clone();
@@ -15,6 +16,9 @@ pub(crate) fn anchors(options: &Options, map: &Survey) -> Result<Anchors> {
     let text = text.map_err(|source| Error::SheetsUnread { plan: plan(), source })?;
     let found =
         SheetPlan::from_json(&text).map_err(|source| Error::SheetsMalformed { plan: plan(), source })?;
+    if options.parameters.precision_crs_units.is_some() {
+        return Err(Error::SheetsWithPrecision { plan: plan() });
+    }
     let tolerance_m = options.parameters.tolerance_m;
     if found.tolerance_m != tolerance_m {
         return Err(Error::SheetsOfOtherTolerance {

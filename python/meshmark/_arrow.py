@@ -35,10 +35,17 @@ class Table:
     def _columns(self, name, geometry):
         """Return the CRS of each geometry column."""
         if geometry is not None:
-            if geometry not in self.table.column_names:
-                raise TypeError(f"layer {name!r} has no column {geometry!r}: it has {', '.join(self.table.column_names)}")
-            return {geometry: self._crs(self.table.schema.field(geometry))}
+            if self.table.column_names.count(geometry) != 1:
+                names = ", ".join(self.table.column_names)
+                raise TypeError(f"layer {name!r} has not one column {geometry!r}: it has {names}")
         fields = {field.name: field for field in self.table.schema}
+        native = [field.name for field in fields.values() if _extension(field)[0].startswith("geoarrow.")]
+        native = [column for column in native if _extension(fields[column])[0] not in EXTENSIONS]
+        if native:
+            raise TypeError(
+                f"column {native[0]!r} of layer {name!r} is {_extension(fields[native[0]])[0]}, and would not be marked: "
+                "make it well-known binary, or drop it"
+            )
         described = self.geo.get("columns", {})
         for column, entry in described.items():
             if column in fields and entry.get("encoding", "WKB") != "WKB":
@@ -46,7 +53,7 @@ class Table:
         return {
             column: self._crs(field)
             for column, field in fields.items()
-            if column in described or _extension(field)[0] in EXTENSIONS
+            if column in described or column == geometry or _extension(field)[0] in EXTENSIONS
         }
 
     def _crs(self, field):

@@ -25,7 +25,13 @@ class Frame:
 
     def __init__(self, name, frame):
         self.frame = frame
-        self.names = [name for name, dtype in frame.dtypes.items() if str(dtype) == "geometry"]
+        self.names = [column for column, dtype in frame.dtypes.items() if str(dtype) == "geometry"]
+        for column, dtype in frame.dtypes.items():
+            if dtype == object and shapely.is_geometry(frame[column].to_numpy()).any():
+                raise TypeError(
+                    f"column {column!r} of layer {name!r} holds geometries, and would not be marked: make it a geometry "
+                    "column with frame.set_geometry, or drop it"
+                )
         self.columns = [
             Column(name, wkb_of(frame[column].to_numpy()), frame[column].crs, frame.index) for column in self.names
         ]
@@ -74,8 +80,16 @@ def wkb_of(array):
 
 def source(name, layer, geometry):
     """Return a layer of whichever kind; `geometry` names the geometry column of a table without metadata."""
-    if hasattr(layer, "geometry") and hasattr(layer, "crs"):
+    if geometry is not None and (hasattr(layer, "geom_type") or isinstance(layer, numpy.ndarray)):
+        raise TypeError(f"geometry={geometry!r} is for tables without metadata, and layer {name!r} is none")
+    if hasattr(layer, "geom_type") and hasattr(layer, "index"):
         return (Frame if hasattr(layer, "columns") else Series)(name, layer)
+    if any(str(dtype) == "geometry" for dtype in getattr(layer, "dtypes", ())):
+        raise TypeError(
+            f"layer {name!r} has no active geometry column: name one with geopandas.GeoDataFrame(frame, geometry=...)"
+        )
+    if str(getattr(layer, "dtype", "")) == "geometry":
+        layer = numpy.asarray(layer, dtype=object)
     if isinstance(layer, numpy.ndarray) and layer.dtype == object:
         return Array(name, layer)
     if hasattr(layer, "__arrow_c_stream__"):

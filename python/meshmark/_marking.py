@@ -80,6 +80,9 @@ def mark(
         raise TypeError(f"mark() has no option {unknown[0]}: use {', '.join(OPTIONS)}")
     if (recipient is None) == (message is None):
         raise TypeError("mark() needs a recipient or a message, and not both")
+    for name, text in (("recipient", recipient), ("message", message), ("srs", srs)):
+        if text is not None and not isinstance(text, str):
+            raise TypeError(f"{name} is {text!r}, a {type(text).__name__}, and not a text")
     if threads is not None and not 1 <= threads <= 256:
         raise ValueError(f"threads={threads} is not a whole number from 1 to 256")
     texts = {"recipient": recipient, "message": message, "srs": srs, **options}

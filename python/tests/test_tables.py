@@ -43,6 +43,13 @@ class Tables(unittest.TestCase):
             self.assert_marked(copy)
             self.assertEqual(copy.schema, table.schema)
 
+    def test_no_column_of_geometries_is_left_out(self):
+        table = pyarrow.table(self.frame.to_arrow(geometry_encoding="WKB", index=False))
+        second = table.append_column("second", pyarrow.array(self.frame.geometry.to_wkb(), pyarrow.binary()))
+        copy, _ = self.mark(second, geometry="second", srs="EPSG:3067")
+        self.assert_marked(copy)
+        self.assertEqual(copy.column("second").to_pylist(), copy.column("geometry").to_pylist())
+
     def test_geoparquet_keeps_its_metadata_and_its_boxes_hold(self):
         self.frame.loc[3, "geometry"] = None
         self.meant, self.record = self.mark(self.frame)
@@ -73,12 +80,12 @@ class Tables(unittest.TestCase):
         table = pyarrow.table({"number": [1], "place": [2.0]})
         with self.assertRaisesRegex(TypeError, "no column that its metadata call a geometry"):
             self.mark(table)
-        with self.assertRaisesRegex(TypeError, "no column 'geom': it has number, place"):
+        with self.assertRaisesRegex(TypeError, "not one column 'geom': it has number, place"):
             self.mark(table, geometry="geom")
         with self.assertRaisesRegex(TypeError, "'place' is double, and not well-known binary"):
             self.mark(table, geometry="place")
         native = pyarrow.table(self.frame.to_arrow(geometry_encoding="geoarrow", index=False))
-        with self.assertRaisesRegex(TypeError, "no column that its metadata call"):
+        with self.assertRaisesRegex(TypeError, "'geometry' .* geoarrow.polygon, and would not be marked"):
             self.mark(native)
         broken = pyarrow.table({"geometry": [b"\x01\x02"]})
         with self.assertRaisesRegex(meshmark.MapError, 'layer "layer", feature 0: .*ends in the middle'):

@@ -111,6 +111,8 @@ pub enum Error {
         places[0][0], places[0][1], places[1][0], places[1][1]
     )]
     SheetsDisagree { paths: [PathBuf; 2], places: [[f64; 2]; 2], vertices: usize },
+    #[error("{} is one sheet, and a plan is about what several share: name all sheets of the map", path.display())]
+    OneSheet { path: PathBuf },
     #[error("the sheet {} was changed while it was planned: plan again when nobody writes to it", path.display())]
     SheetChanged { path: PathBuf },
     #[error("the folder {} has no record (*.json): give the folder the records were written to", folder.display())]

@@ -7,6 +7,7 @@ use crate::{
     Error, Result,
     inputs::maps::{self, Reading},
     progress::Progress,
+    words::printable,
 };
 use meshmark_core::{
     anchors::Anchors,
@@ -36,8 +37,16 @@ struct Known {
 ///
 /// # Errors
 /// Fails on a sheet that is unreadable, and on sheets that do not belong together.
-pub fn plan(options: &Options, named: &[PathBuf], progress: &mut Progress) -> Result<SheetPlan> {
-    let files = files(named)?;
+pub fn plan(
+    options: &Options,
+    named: &[PathBuf],
+    progress: &mut Progress,
+    warn: &mut dyn FnMut(&str),
+) -> Result<SheetPlan> {
+    let files = files(named, warn)?;
+    if let [only] = files.as_slice() {
+        return Err(Error::OneSheet { path: only.clone() });
+    }
     progress.start("reading sheets", 2 * files.len() as u64);
     let step = progress.stepper();
     let mut sheets: Vec<Known> = Vec::new();
@@ -132,8 +141,9 @@ fn disagreement(sheets: &[Known], found: Disagreement) -> Error {
     Error::SheetsDisagree { paths: numbers.map(|number| sheets[number].path.clone()), places, vertices }
 }
 
-/// Returns the files of sheets, those of folders among them, in the order of their names.
-fn files(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
+/// Returns the files of sheets, those of folders among them, in the order of their names. Warns of what a
+/// folder has besides.
+fn files(named: &[PathBuf], warn: &mut dyn FnMut(&str)) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in named {
         if !path.is_dir() {
@@ -149,6 +159,11 @@ fn files(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
             let is_json = name.to_ascii_lowercase().ends_with(".json");
             if Format::stem(&name).is_some() && !is_json && path.is_file() {
                 files.push(path);
+            } else if !is_of_a_sheet(&path) {
+                warn(&format!(
+                    "{} is not planned: if it is a sheet, name it as one",
+                    printable(&path.display().to_string())
+                ));
             }
         }
         if files.len() == before {
@@ -158,6 +173,13 @@ fn files(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     files.sort();
     files.dedup();
     Ok(files)
+}
+
+/// Returns whether a file may belong to a sheet without being one, such as a .dbf.
+fn is_of_a_sheet(path: &Path) -> bool {
+    let sidecars = ["dbf", "shx", "prj", "cpg", "qix", "gpkg-wal", "gpkg-shm"];
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    path.is_file() && extension.is_some_and(|extension| sidecars.contains(&extension.as_str()))
 }
 
 fn name(path: &Path) -> String {

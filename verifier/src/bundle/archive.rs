@@ -72,6 +72,15 @@ impl Bundle {
         self.files.len()
     }
 
+    /// Returns whether a file is this archive and nothing else: a second entry of one name, a comment and
+    /// bytes around the archive would show something to those who unpack it with another program.
+    ///
+    /// # Errors
+    /// Fails when the file cannot be read.
+    pub fn is_all_of(&self, path: &Path) -> Result<bool> {
+        Ok(texts::bytes("bundle", path)? == self.to_bytes()?)
+    }
+
     /// Returns the names of the files that are not the same in another bundle.
     pub fn differing<'a>(&'a self, other: &'a Bundle) -> Vec<&'a str> {
         let names =

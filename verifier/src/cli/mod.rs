@@ -108,7 +108,8 @@ fn plan_sheets(args: &PlanArgs) -> Result<()> {
     let file = NewFile::new("plan", output)?;
     let flags = [("LAYERS", layers), ("SRS", srs), ("TOLERANCE", tolerance)];
     let given = flags.iter().filter_map(|(name, value)| Some((*name, value.as_deref()?)));
-    let plan = sheets::plan(&Options::parse_for_recipients(given)?, named, &mut Progress::default())?;
+    let options = Options::parse_for_recipients(given)?;
+    let plan = sheets::plan(&options, named, &mut Progress::default(), &mut warn)?;
     file.write(plan.to_json().as_bytes())?;
     let count = |number: fn(&PlannedSheet) -> usize| plan.sheets.iter().map(number).sum::<usize>();
     print(&format!(

@@ -38,6 +38,9 @@ pub(super) fn run(args: &RepeatArgs) -> Result<()> {
         .into_iter()
         .map(|name| format!("{} is another one", printable(name)))
         .collect();
+    if differences.is_empty() && !again.is_all_of(path)? {
+        differences.push("the archive holds more than its files".into());
+    }
     if differences.is_empty() {
         let count = counted(given.count(), "file");
         return print(&format!("{} is made again from its inputs: {count}, byte by byte\n", path.display()));

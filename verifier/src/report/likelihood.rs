@@ -17,6 +17,9 @@ const SCALE: [(f64, &str); 7] = [
     (f64::INFINITY, "extremely strong"),
 ];
 
+/// What the first ratio compares with.
+const ANOTHER: &str = "a copy of another recipient";
+
 /// The likelihood ratios of a recipient.
 #[derive(Debug, Clone, Serialize)]
 pub struct LikelihoodEntry {
@@ -35,8 +38,11 @@ impl LikelihoodEntry {
     /// Adds the words.
     pub fn new(ratios: Ratios) -> Self {
         LikelihoodEntry {
-            another_recipient: support(ratios.another_recipient_log10, "a copy of another recipient"),
-            no_copy: support(ratios.no_copy_log10, "no copy of this key"),
+            another_recipient: support(ratios.another_recipient_log10, ANOTHER),
+            no_copy: match points_elsewhere(&ratios) {
+                true => "support for some copy of this key, and not for that of this recipient".into(),
+                false => support(ratios.no_copy_log10, "no copy of this key"),
+            },
             ratios,
             stated_log10: [LEAST_LOG10, MOST_LOG10],
         }
@@ -47,6 +53,10 @@ impl LikelihoodEntry {
         let line = |log10: f64, against: &str, support: &str| {
             format!("{} against {against}: {support}", number(log10))
         };
+        if points_elsewhere(&self.ratios) {
+            let other = line(self.ratios.another_recipient_log10, ANOTHER, &self.another_recipient);
+            return vec![format!("likelihood:   ratio {other}")];
+        }
         let [other, none] = self.each(line);
         vec![format!("likelihood:   ratio {other}"), format!("              ratio {none}")]
     }
@@ -72,16 +82,28 @@ impl LikelihoodEntry {
              court alone."
                 .into(),
         ];
-        self.each(sentence).into_iter().chain(rest).collect()
+        let [other, none] = self.each(sentence);
+        let none = match points_elsewhere(&self.ratios) {
+            true => "No ratio against no copy of this key is stated: what shows of the key supports a copy of another                      recipient."
+                .into(),
+            false => none,
+        };
+        [other, none].into_iter().chain(rest).collect()
     }
 
     fn each(&self, text: impl Fn(f64, &str, &str) -> String) -> [String; 2] {
         let Ratios { another_recipient_log10, no_copy_log10 } = self.ratios;
         [
-            text(another_recipient_log10, "a copy of another recipient", &self.another_recipient),
+            text(another_recipient_log10, ANOTHER, &self.another_recipient),
             text(no_copy_log10, "no copy of this key", &self.no_copy),
         ]
     }
+}
+
+/// Returns whether a mark of the key shows, and speaks against the copy of this recipient: the ratio against no
+/// copy, read alone, would then accuse him.
+fn points_elsewhere(ratios: &Ratios) -> bool {
+    ratios.another_recipient_log10 < 0.0 && ratios.no_copy_log10 > 0.0
 }
 
 /// Names the support for the recipient's copy, or for what it is compared with.
@@ -119,6 +141,14 @@ fn times(log10: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mark_of_another_recipient_supports_no_statement_about_this_one() {
+        let entry = LikelihoodEntry::new(Ratios { another_recipient_log10: -1.8, no_copy_log10: MOST_LOG10 });
+        let texts = [entry.to_lines(), entry.to_sentences(), vec![entry.no_copy]].concat().join("\n");
+        assert!(!texts.contains("support for the copy of this recipient"), "{texts}");
+        assert!(texts.contains("moderate support for a copy of another recipient"), "{texts}");
+    }
 
     #[test]
     fn ratios_have_the_words_of_the_scale_for_either_side() {
