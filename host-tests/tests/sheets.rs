@@ -152,7 +152,8 @@ fn a_plan_that_does_not_fit_is_refused_and_nothing_is_written() {
     fs::write(host.path("later.json"), text.replace("\"meshmark_plan\": 1", "\"meshmark_plan\": 9")).unwrap();
     fs::write(host.path("cut.json"), &text[..text.len() / 2]).unwrap();
     fs::write(host.path("mercator.json"), text.replace("EPSG:3067", "EPSG:3857")).unwrap();
-    plan(&host, &["sheets/east.gpkg", "-o", "east.json"]).succeeds();
+    host.copy("kotka.gpkg", "kotka.gpkg");
+    plan(&host, &["sheets/east.gpkg", "kotka.gpkg", "-o", "east.json"]).succeeds();
     for (options, words) in [
         (&["SHEETS=lost.json"][..], "SHEETS=lost.json cannot be read"),
         (&["SHEETS=cut.json"], "SHEETS=cut.json is no plan: malformed plan"),
@@ -162,6 +163,10 @@ fn a_plan_that_does_not_fit_is_refused_and_nothing_is_written() {
         (&["SHEETS=east.json"], "SHEETS=east.json has no sheet with the vertices of this map"),
         (&["SHEETS=plan.json", "LAYERS=buildings"], "has no sheet with the vertices of this map"),
         (&["SHEETS=plan.json", "TOLERANCE=0.5"], "made with TOLERANCE=0.75, and this sheet is marked with"),
+        (
+            &["SHEETS=plan.json", "PRECISION=0.01"],
+            "in place, and PRECISION would round it: leave PRECISION out",
+        ),
         (&["SHEETS=plan.json", "CODE=LDPC"], "SHEETS is for fingerprints"),
     ] {
         let before = host.files();
@@ -196,11 +201,24 @@ fn sheets_that_do_not_belong_together_are_not_planned() {
         (&["map.gpkg", "same.gpkg", "-o", "plan.json"], 4, "have the same vertices"),
         (&["rounded.gpkg", east, "-o", "plan.json"], 4, "disagree on"),
         (&["sheets", "--tolerance", "0", "-o", "plan.json"], 2, "--tolerance 0 is not a number"),
+        (
+            &[west, west, "-o", "plan.json"],
+            2,
+            "west.gpkg is one sheet, and a plan is about what several share",
+        ),
     ] {
         let before = host.files();
         let run = plan(&host, arguments);
         assert_eq!(run.code, Some(code), "{arguments:?}: {}", run.stderr);
         assert!(run.stderr.contains(words) && run.stderr.lines().count() == 1, "{}", run.stderr);
         assert!(host.files() == before, "{arguments:?}");
+    }
+    // What a folder has besides may be a sheet.
+    fs::create_dir(host.path("sheets/north")).unwrap();
+    fs::write(host.path("sheets/south.gml"), "").unwrap();
+    let run = plan(&host, &["sheets", "-o", "plan.json"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    for skipped in ["sheets/north", "sheets/south.gml"] {
+        assert!(run.stderr.contains(&format!("{skipped} is not planned")), "{}", run.stderr);
     }
 }

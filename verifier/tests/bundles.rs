@@ -147,6 +147,14 @@ fn a_bundle_whose_report_was_changed_is_not_made_again() {
     bundle(&vendor, &["--record", "records/acme.json"]);
     let auditor = Auditor::new(&vendor);
     let path = auditor.0.path().join("case.zip");
+    // Bytes before and after an archive, where another program may find other files.
+    let bytes = fs::read(&path).unwrap();
+    for around in [[&b"PK"[..], &bytes], [&bytes, b"PK"]] {
+        fs::write(&path, around.concat()).unwrap();
+        let (code, text) = auditor.repeat();
+        assert!(code == Some(4) && text.contains("holds more than its files"), "{code:?} {text}");
+    }
+    fs::write(&path, bytes).unwrap();
     let changed = files(&path).into_iter().map(|(name, bytes)| match name.as_str() {
         "report.html" => {
             (name, String::from_utf8(bytes).unwrap().replace("ACME GmbH", "Innocent Ltd").into_bytes())
