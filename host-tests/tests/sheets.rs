@@ -193,7 +193,7 @@ fn sheets_that_do_not_belong_together_are_not_planned() {
     let (west, east) = ("sheets/west.gpkg", "sheets/east.gpkg");
     for (arguments, code, words) in [
         (&["empty", "-o", "plan.json"][..], 2, "the folder empty has no sheet"),
-        (&["lost", "-o", "plan.json"], 5, "the sheet lost cannot be opened"),
+        (&["lost", west, "-o", "plan.json"], 5, "the sheet lost cannot be opened"),
         (&["sheets", "-o", "there.json"], 2, "a plan is never overwritten"),
         (&[west, "key.json", "-o", "plan.json"], 5, "the sheet key.json cannot be opened"),
         (&[west, "MESHMARK:sheets/east.gpkg", "-o", "plan.json"], 2, "is a marked view already"),
