@@ -17,12 +17,12 @@ use std::{
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// What unwinds a job that is cancelled, up to [`run`]; it is no panic, and nothing is printed.
-pub struct Cancelled(Mutex<Option<PyErr>>);
+pub struct Cancelled(Option<PyErr>);
 
 impl Cancelled {
     /// Ends the job with an exception.
     pub fn with(error: PyErr) -> ! {
-        resume_unwind(Box::new(Cancelled(Mutex::new(Some(error)))))
+        resume_unwind(Box::new(Cancelled(Some(error))))
     }
 }
 
@@ -43,7 +43,7 @@ impl Job {
     pub fn step(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
         if self.is_cancelled.load(Ordering::Relaxed) {
-            resume_unwind(Box::new(Cancelled(Mutex::new(None))));
+            resume_unwind(Box::new(Cancelled(None)));
         }
     }
 }
@@ -96,10 +96,7 @@ fn show(state: &Job, progress: Option<&Bound<PyAny>>, shown: &mut usize) -> PyRe
 /// Returns the exception of a job that was cancelled. A panic goes on, and pyo3 makes it an exception.
 fn exception(thrown: Box<dyn Any + Send>) -> PyErr {
     match thrown.downcast::<Cancelled>() {
-        Ok(cancelled) => {
-            let error = cancelled.0.into_inner().ok().flatten();
-            error.unwrap_or_else(|| PyKeyboardInterrupt::new_err(()))
-        }
+        Ok(cancelled) => cancelled.0.unwrap_or_else(|| PyKeyboardInterrupt::new_err(())),
         Err(panicked) => resume_unwind(panicked),
     }
 }

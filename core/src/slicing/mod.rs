@@ -47,8 +47,8 @@ pub fn lowest(matrix: &SparseSymmetric, count: usize, least_gap: f64) -> Option<
         return None;
     }
     let mut slicer = Slicer::new(matrix)?;
-    let nodes = isolation::isolate(slicer.range(), [count, matrix.size()], |queries| slicer.nodes(queries))?;
-    let mut nodes = nodes;
+    let sizes = [count, matrix.size()];
+    let mut nodes = isolation::isolate(slicer.range(), sizes, |queries| slicer.nodes(queries))?;
     let mut brackets = isolation::brackets(&nodes, count)?;
     for _ in 0..REFINEMENTS {
         let queries = interpolation::queries(&nodes, &brackets, slicer.norm());
