@@ -9,6 +9,10 @@ pub enum WkbError {
     Truncated,
     #[error("geometry type {0} is not known")]
     UnknownType(u32),
+    #[error("the geometry has a reference system of its own (EWKB); write it without one, as ST_AsBinary does")]
+    OwnSrid,
+    #[error("{0} bytes follow the geometry")]
+    BytesAfter(usize),
     #[error("the geometry is nested more than {MOST_NESTED} deep")]
     TooDeep,
     #[error("the geometry does not begin as those of a GeoPackage do")]
@@ -16,6 +20,9 @@ pub enum WkbError {
 }
 
 const MOST_NESTED: usize = 64;
+
+/// The flag of a type code that a reference system follows.
+const OF_SRID: u32 = 0x2000_0000;
 
 /// The role of a coordinate pair: it begins a sequence (ring, line, point) or is joined to the pair
 /// before it.
@@ -40,7 +47,12 @@ pub fn map_coordinates<E: From<WkbError>>(
     wkb: &mut [u8],
     f: &mut impl FnMut(Step, [f64; 2]) -> Result<[f64; 2], E>,
 ) -> Result<(), E> {
-    Cursor { bytes: wkb, at: 0 }.geometry(f, 0)
+    let mut cursor = Cursor { bytes: wkb, at: 0 };
+    cursor.geometry(f, 0)?;
+    match cursor.bytes.len() - cursor.at {
+        0 => Ok(()),
+        after => Err(WkbError::BytesAfter(after).into()),
+    }
 }
 
 /// Encodes a geometry of these chains, each with the kind of its first step: polygons with their
@@ -123,9 +135,6 @@ impl Cursor<'_> {
         let little_endian = self.take::<1>()? == [1];
         let code = self.count(little_endian)?;
         let (kind, ordinates) = decode_type(code);
-        if code & 0x2000_0000 != 0 {
-            self.take::<4>()?; // the SRID of extended WKB
-        }
         let layout = Layout { little_endian, ordinates };
         match kind {
             1 => self.point(&layout, f, Step::First, true),
@@ -144,6 +153,7 @@ impl Cursor<'_> {
                 }
                 Ok(())
             }
+            _ if matches!(decode_type(code & !OF_SRID).0, 1..=17) => Err(WkbError::OwnSrid.into()),
             _ => Err(WkbError::UnknownType(code).into()),
         }
     }
@@ -285,11 +295,19 @@ mod tests {
         let result = map_coordinates::<WkbError>(&mut unknown, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::UnknownType(99)));
         // GDAL reads the last byte of such a code alone.
-        for code in [4001u32, 0xcf09, 0x0fff_ffff, 0x1000_0001, 0x2000_0001] {
+        for code in [4001u32, 0xcf09, 0x0fff_ffff, 0x1000_0001] {
             let mut beyond = [&[1][..], &code.to_le_bytes(), &[0; 32]].concat();
             let result = map_coordinates::<WkbError>(&mut beyond, &mut |_, p| Ok(p));
             assert_eq!(result, Err(WkbError::UnknownType(code)));
         }
+        for code in [0x2000_0001u32, 0xa000_0003, 0x2000_0007] {
+            let mut extended = [&[1][..], &code.to_le_bytes(), &[0; 32]].concat();
+            let result = map_coordinates::<WkbError>(&mut extended, &mut |_, p| Ok(p));
+            assert_eq!(result, Err(WkbError::OwnSrid));
+        }
+        let mut followed = [&wkb[..], b"hidden"].concat();
+        let result = map_coordinates::<WkbError>(&mut followed, &mut |_, p| Ok(p));
+        assert_eq!(result, Err(WkbError::BytesAfter(6)));
         let mut nested: Vec<u8> = [1, 7, 0, 0, 0, 1, 0, 0, 0].repeat(1000);
         let result = map_coordinates::<WkbError>(&mut nested, &mut |_, p| Ok(p));
         assert_eq!(result, Err(WkbError::TooDeep));
