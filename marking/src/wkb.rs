@@ -9,7 +9,9 @@ pub enum WkbError {
     Truncated,
     #[error("geometry type {0} is not known")]
     UnknownType(u32),
-    #[error("the geometry has a reference system of its own (EWKB); write it without one, as ST_AsBinary does")]
+    #[error(
+        "the geometry has a reference system of its own (EWKB); write it without one, as ST_AsBinary does"
+    )]
     OwnSrid,
     #[error("{0} bytes follow the geometry")]
     BytesAfter(usize),

@@ -3,6 +3,7 @@
 use crate::{
     Error, Result,
     inputs::texts::{self, ReadRecord},
+    words::printable,
 };
 use der::DateTime;
 use meshmark_core::recorded::Recorded;
@@ -34,6 +35,15 @@ pub struct IndexedCopy {
     pub state: State,
     /// The day on which the copy was last written, or its record where the copy is not there, UTC.
     pub written: String,
+}
+
+impl IndexedCopy {
+    /// Makes all names printable; they are then for readers, not for programs.
+    pub fn make_printable(&mut self) {
+        for name in [&mut self.recipient, &mut self.record, &mut self.copy] {
+            *name = printable(name);
+        }
+    }
 }
 
 /// How the file of a copy compares with its record.

@@ -85,3 +85,17 @@ fn a_folder_that_is_missing_or_has_no_record_or_a_damaged_one_is_refused() {
     let (code, text) = records(folder.path());
     assert!(code == Some(2) && text.contains("a.json"), "{text}");
 }
+
+#[test]
+fn names_are_given_to_programs_as_they_are_and_do_not_control_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = "AC\u{1b}[2J\u{202e}ME";
+    write(&folder.path().join("a.json"), &[("/recipient", json!(name))]);
+    let (code, table) = records(folder.path());
+    assert!(code == Some(0) && table.contains(name), "{table}");
+    let command = format!("{} records {}", env!("CARGO_BIN_EXE_meshmark"), folder.path().display());
+    let mut script = Command::new("script");
+    let (code, shown) = ended(script.args(["-qec", &command, "/dev/null"]).output().unwrap());
+    assert!(code == Some(0) && shown.contains(r"AC\u{1b}[2J\u{202e}ME"), "{shown}");
+    assert!(!shown.contains(['\u{1b}', '\u{202e}']), "{shown}");
+}

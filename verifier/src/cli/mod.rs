@@ -16,14 +16,18 @@ use meshmark_core::{counted, options::Options, sheet_plan::PlannedSheet};
 use meshmark_verifier::{
     Error, Result,
     compare::{Comparison, Details, compare, detail::ComparedFiles},
-    copies_index, distribute, html,
+    copies_index::{self, IndexedCopy},
+    distribute, html,
     inputs::{gdal_failures, texts},
     outputs::{Format, NewFile, ReportFile},
     progress::Progress,
     sheets,
 };
 use printing::{print, warn, warn_of_displacements};
-use std::path::Path;
+use std::{
+    io::{IsTerminal, stdout},
+    path::Path,
+};
 
 /// The exit code of a command that succeeds; a match has the same code.
 const DONE: u8 = 0;
@@ -121,6 +125,12 @@ fn plan_sheets(args: &PlanArgs) -> Result<()> {
     ))
 }
 
+/// Prints the table of copies: as it is for programs, and so that names cannot control it for a
+/// terminal.
 fn list_copies(folder: &Path) -> Result<()> {
-    print(&copies_index::to_csv(&copies_index::index(folder, &mut warn)?))
+    let mut copies = copies_index::index(folder, &mut warn)?;
+    if stdout().is_terminal() {
+        copies.iter_mut().for_each(IndexedCopy::make_printable);
+    }
+    print(&copies_index::to_csv(&copies))
 }
