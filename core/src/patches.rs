@@ -54,10 +54,10 @@ impl Patch {
     /// Replaces the rows of hanging vertices (n × any) by those that follow from their anchors.
     pub(crate) fn follow(&self, rows: &mut Mat<f64>) {
         for column in 0..rows.ncols() {
+            let values = rows.col_as_slice_mut(column);
             for hanging in &self.hanging {
-                let terms =
-                    hanging.anchors.iter().map(|&(anchor, weight)| weight * rows[(anchor as usize, column)]);
-                rows[(hanging.row as usize, column)] = terms.sum();
+                let terms = hanging.anchors.iter().map(|&(anchor, weight)| weight * values[anchor as usize]);
+                values[hanging.row as usize] = terms.sum();
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::{
     options::{AmplitudeOf, Parameters, Rigidity},
-    patches::Patch,
+    patches::{BodyRows, Patch},
     spectrum::Basis,
     stiffness::stiffen,
 };
@@ -246,21 +246,24 @@ fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
 fn coupled(patch: &Patch, basis: Mat<f64>) -> [[Mat<f64>; 2]; 2] {
     let (n, columns) = (basis.nrows(), basis.ncols());
     let mut blocks = [[basis.clone(), Mat::zeros(n, columns)], [Mat::zeros(n, columns), basis]];
-    for body in &patch.bodies {
-        let inertia: f64 = body.arms_m.iter().map(|[x, y]| x * x + y * y).sum();
-        for column in 0..columns {
-            let own: Vec<f64> = body.rows.iter().map(|&row| blocks[0][0][(row as usize, column)]).collect();
+    let inertia = |body: &BodyRows| body.arms_m.iter().map(|[x, y]| x * x + y * y).sum::<f64>();
+    let bodies: Vec<(&BodyRows, f64)> = patch.bodies.iter().map(|body| (body, inertia(body))).collect();
+    for column in 0..columns {
+        let [[xx, xy], [yx, yy]] =
+            blocks.each_mut().map(|row| row.each_mut().map(|block| block.col_as_slice_mut(column)));
+        for (body, inertia) in &bodies {
+            let own = || body.rows.iter().map(|&row| xx[row as usize]);
             let moment = |axis: usize| {
-                let sum: f64 = body.arms_m.iter().zip(&own).map(|(arm, value)| arm[axis] * value).sum();
-                if inertia > 0.0 { sum / inertia } else { 0.0 }
+                let sum: f64 = body.arms_m.iter().zip(own()).map(|(arm, value)| arm[axis] * value).sum();
+                if *inertia > 0.0 { sum / inertia } else { 0.0 }
             };
-            let (shift, moments) = (own.iter().sum::<f64>() / own.len() as f64, [moment(0), moment(1)]);
+            let (shift, moments) = (own().sum::<f64>() / body.rows.len() as f64, [moment(0), moment(1)]);
             for (&row, [x, y]) in body.rows.iter().zip(&body.arms_m) {
-                let at = (row as usize, column);
-                blocks[0][0][at] = shift + y * moments[1];
-                blocks[0][1][at] = -y * moments[0];
-                blocks[1][0][at] = -x * moments[1];
-                blocks[1][1][at] = shift + x * moments[0];
+                let row = row as usize;
+                xx[row] = shift + y * moments[1];
+                xy[row] = -y * moments[0];
+                yx[row] = -x * moments[1];
+                yy[row] = shift + x * moments[0];
             }
         }
     }

@@ -202,19 +202,19 @@ pub(crate) fn stiffen(strains: &Strains, free: &[usize], blocks: &mut [[Mat<f64>
         .sp_cholesky(Side::Lower)
         .expect("the identity and squares are positive definite");
     let [[xx, xy], [yx, yy]] = blocks;
-    for of_axes in [[xx, yx], [xy, yy]] {
-        let columns = of_axes[0].ncols();
-        let at = |unknown: usize| (unknown % 2, free[unknown / 2]);
-        let mut moved = Mat::from_fn(2 * free.len(), columns, |unknown, column| {
-            let (axis, row) = at(unknown);
-            of_axes[axis][(row, column)]
-        });
+    for [along_x, along_y] in [[xx, yx], [xy, yy]] {
+        let columns = along_x.ncols();
+        let mut moved = Mat::zeros(2 * free.len(), columns);
+        for column in 0..columns {
+            let (x, y) = (along_x.col_as_slice(column), along_y.col_as_slice(column));
+            let unknowns = moved.col_as_slice_mut(column).chunks_exact_mut(2);
+            unknowns.zip(free).for_each(|(unknown, &row)| unknown.copy_from_slice(&[x[row], y[row]]));
+        }
         factor.solve_in_place(&mut moved);
         for column in 0..columns {
-            for unknown in 0..2 * free.len() {
-                let (axis, row) = at(unknown);
-                of_axes[axis][(row, column)] = moved[(unknown, column)];
-            }
+            let (x, y) = (along_x.col_as_slice_mut(column), along_y.col_as_slice_mut(column));
+            let unknowns = moved.col_as_slice(column).chunks_exact(2);
+            unknowns.zip(free).for_each(|(unknown, &row)| [x[row], y[row]] = [unknown[0], unknown[1]]);
         }
     }
 }
