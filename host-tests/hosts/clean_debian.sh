@@ -20,6 +20,7 @@ mounts=()
 in_root() {
     local folder=$1 what=$2 command=$3 mount from to begin=$EPOCHREALTIME
     local mount_all="mount -t proc proc '$folder/proc' && mount -t tmpfs tmpfs '$folder/dev/shm'"
+    mount_all+=" && mount -t devpts devpts '$folder/dev/pts'"
     for mount in "${mounts[@]}" "/etc/ssl/certs /opt/certs"; do
         read -r from to <<<"$mount"
         mount_all+=" && mkdir -p '$folder$to' && mount --bind '$from' '$folder$to'"
