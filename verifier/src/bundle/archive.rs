@@ -90,16 +90,56 @@ impl Bundle {
 }
 
 fn unpacked(bytes: Vec<u8>) -> std::result::Result<Bundle, String> {
+    // Entries may name the same bytes, so that a small archive unpacks without end.
+    let mut left = bytes.len();
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let mut files = BTreeMap::new();
     for number in 0..archive.len() {
         let mut file = archive.by_index(number).map_err(|error| error.to_string())?;
+        let size = usize::try_from(file.size()).unwrap_or(usize::MAX);
+        left = left.checked_sub(size).ok_or("its entries are larger than the file: they overlap")?;
         let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        file.by_ref().take(size as u64).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
         let name = file.name().map_err(|error| error.to_string())?.into_owned();
         files.insert(name, bytes);
     }
     let manifest = files.get(MANIFEST).ok_or("it has no manifest.json")?;
     let manifest = Manifest::from_json(manifest).map_err(|reason| format!("its manifest.json: {reason}"))?;
     Ok(Bundle { manifest, files })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns an archive of `count` entries that all have the same bytes of this size.
+    fn sharing(count: u16, size: usize) -> Vec<u8> {
+        const END: usize = 22;
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        archive.start_file("00000", stored).unwrap();
+        archive.write_all(&vec![0; size]).unwrap();
+        let one = archive.finish().unwrap().into_inner();
+        let mut end = one[one.len() - END..].to_vec();
+        let directory = u32::from_le_bytes(end[16..20].try_into().unwrap()) as usize;
+        let entry = &one[directory..one.len() - END];
+        let mut all = one[..directory].to_vec();
+        for number in 0..count {
+            let mut entry = entry.to_vec();
+            entry[46..51].copy_from_slice(format!("{number:05}").as_bytes());
+            all.extend(entry);
+        }
+        let of_directory = (all.len() - directory) as u32;
+        end[8..10].copy_from_slice(&count.to_le_bytes());
+        end[10..12].copy_from_slice(&count.to_le_bytes());
+        end[12..16].copy_from_slice(&of_directory.to_le_bytes());
+        [all, end].concat()
+    }
+
+    #[test]
+    fn an_archive_whose_entries_overlap_is_refused_before_it_is_unpacked() {
+        assert_eq!(unpacked(sharing(1, 1000)), Err("it has no manifest.json".into()));
+        let reason = unpacked(sharing(200, 1_000_000)).unwrap_err();
+        assert!(reason.contains("overlap"), "{reason}");
+    }
 }
