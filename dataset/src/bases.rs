@@ -1,19 +1,13 @@
-//! The bases of a marking: the earlier editions from which vertices stand, with their references, and
-//! the anchors by which the map fits other sheets.
+//! The bases of a marking and its anchors, from the records, references and plan that options name.
 
-use crate::{Error, Result, Survey, sheets};
+use crate::{CoordinateSystem, Error, Result, Survey, sheets};
 use meshmark_core::{
-    anchors::Anchors,
-    fingerprint_record::{BaseEntry, FingerprintRecord, PartEntry},
-    ground::Ground,
+    fingerprint_record::{BaseEntry, FingerprintRecord},
     key::{SecretKey, read_text},
-    map::Map,
-    map_data::MapData,
-    options::{Options, Parameters, join_list},
+    options::{Options, join_list},
     recorded::Recorded,
-    series::{Census, Edition, Series},
 };
-use meshmark_marking::{Crs, Lineage};
+use meshmark_marking::{Bases, Crs, ReadBase};
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
@@ -22,163 +16,48 @@ use std::{
 /// The options that shape a fingerprint, which all editions of a series share.
 const SHARED: [&str; 6] = ["AMPLITUDE", "PATCH_SIZE", "TOLERANCE", "PRECISION", "SHAPE", "BASIS"];
 
-/// Reads a reference as its entry describes it; returns nothing for a map without these layers.
-pub type ReadBase<'a, E> = dyn FnMut(&Path, &BaseEntry) -> std::result::Result<Option<Survey>, E> + 'a;
-
-/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors.
-#[derive(Default)]
-pub struct Bases {
-    anchors: Anchors,
-    entries: Vec<BaseEntry>,
-    references: Vec<BaseMap>,
-}
-
-/// The reference of a base.
-struct BaseMap {
-    data: MapData,
-    /// Metres on the ground at the place of a vertex, which fingerprints follow.
-    ground: Ground,
-}
-
-impl Bases {
-    /// Reads the bases and the plan of sheets that options name, for a map that is to be marked with
-    /// this key. `read` reads a reference as its entry describes it.
-    ///
-    /// # Errors
-    /// Fails on a plan that the map is not in, on a record that is unreadable or of another key, mark or map, on a reference that is
-    /// missing, and on the errors of `read`.
-    pub fn of_options<E: From<Error>>(
-        options: &Options,
-        key: &SecretKey,
-        map: &Survey,
-        read: &mut ReadBase<'_, E>,
-    ) -> std::result::Result<Self, E> {
-        let anchors = sheets::anchors(options, map)?;
-        let Some(named) = &options.bases else {
-            return match options.base_references {
-                Some(_) => Err(Error::NoBase.into()),
-                None => Ok(Bases { anchors, ..Bases::default() }),
-            };
+/// Reads the bases and the plan of sheets that options name, for a map that is to be marked with
+/// this key. `read` reads a reference as its entry describes it.
+///
+/// # Errors
+/// Fails on a plan that the map is not in, on a record that is unreadable or of another key, mark or map, on a reference that is
+/// missing, and on the errors of `read`.
+pub fn read_bases<E: From<Error> + From<meshmark_marking::Error>>(
+    options: &Options,
+    key: &SecretKey,
+    map: &Survey,
+    read: &mut ReadBase<'_, PathBuf, CoordinateSystem, E>,
+) -> std::result::Result<Bases, E> {
+    let anchors = sheets::anchors(options, map)?;
+    let Some(named) = &options.bases else {
+        return match options.base_references {
+            Some(_) => Err(Error::NoBase.into()),
+            None => Ok(Bases::of_anchors(anchors)),
         };
-        let mut entries: Vec<BaseEntry> = Vec::new();
-        let own_digest = map.data.vertices.digest();
-        for path in records_at(named)? {
-            let record = read_record(&path)?;
-            check_record(&path, &record, options, key, map)?;
-            // A copy of this very edition for somebody else is no earlier edition, but it may name some.
-            if record.reference.vertices_sha256 == own_digest && record.bases.is_empty() {
-                return Err(Error::BaseOfThisEdition { base: path }.into());
-            }
-            for entry in record.chain().into_iter().filter(|entry| entry.vertices_sha256 != own_digest) {
-                match entries.iter().find(|known| known.vertices_sha256 == entry.vertices_sha256) {
-                    None => entries.push(entry),
-                    Some(known) if *known == entry => {}
-                    Some(_) => return Err(Error::ContradictingBase { base: path }.into()),
-                }
+    };
+    let mut entries: Vec<BaseEntry> = Vec::new();
+    let own_digest = map.data.vertices.digest();
+    for path in records_at(named)? {
+        let record = read_record(&path)?;
+        check_record(&path, &record, options, key, map)?;
+        // A copy of this very edition for somebody else is no earlier edition, but it may name some.
+        if record.reference.vertices_sha256 == own_digest && record.bases.is_empty() {
+            return Err(Error::BaseOfThisEdition { base: path }.into());
+        }
+        for entry in record.chain().into_iter().filter(|entry| entry.vertices_sha256 != own_digest) {
+            match entries.iter().find(|known| known.vertices_sha256 == entry.vertices_sha256) {
+                None => entries.push(entry),
+                Some(known) if *known == entry => {}
+                Some(_) => return Err(Error::ContradictingBase { base: path }.into()),
             }
         }
-        let references = options.base_references.as_ref().ok_or(Error::NoBaseReference)?;
-        let references: Vec<PathBuf> = references.iter().map(PathBuf::from).collect();
-        let bases = Bases::find((entries, anchors), &references, read)?;
-        match bases.have_any_of(map) {
-            true => Ok(bases),
-            false => Err(Error::OtherBase { base: join_list(named) }.into()),
-        }
     }
-
-    /// Finds the reference of every entry among these files, for a map with these anchors; `read`
-    /// returns nothing for a file that lacks the layers of the entry.
-    ///
-    /// # Errors
-    /// Fails on an entry without a reference, and on the errors of `read`.
-    pub fn find<E: From<Error>>(
-        (entries, anchors): (Vec<BaseEntry>, Anchors),
-        files: &[PathBuf],
-        read: &mut ReadBase<'_, E>,
-    ) -> std::result::Result<Self, E> {
-        let mut found: Vec<Option<Survey>> = entries.iter().map(|_| None).collect();
-        let alike = |a: &BaseEntry, b: &BaseEntry| a.layers == b.layers && a.srs == b.srs;
-        for file in files {
-            for (number, entry) in entries.iter().enumerate() {
-                // Entries that describe their maps alike read the file alike.
-                let lack =
-                    |(survey, other): (&Option<Survey>, &BaseEntry)| survey.is_none() && alike(other, entry);
-                let is_first = !entries[..number].iter().any(|other| alike(other, entry));
-                if !is_first || !found.iter().zip(&entries).any(lack) {
-                    continue;
-                }
-                let Some(survey) = read(file, entry)? else { continue };
-                let digest = survey.data.vertices.digest();
-                let own = |other: &BaseEntry| other.vertices_sha256 == digest && alike(other, entry);
-                if let Some(place) = entries.iter().position(own) {
-                    found[place].get_or_insert(survey);
-                }
-            }
-        }
-        let lost = found.iter().zip(&entries).find(|(survey, _)| survey.is_none());
-        if let Some((_, entry)) = lost {
-            return Err(Error::LostBase { vertices_sha256: entry.vertices_sha256.clone() }.into());
-        }
-        let of_survey = |survey: Survey| {
-            let ground = survey.measure()?.clone();
-            Ok::<BaseMap, Error>(BaseMap { data: survey.data, ground })
-        };
-        let references = found.into_iter().flatten().map(of_survey).collect::<Result<_>>()?;
-        Ok(Bases { anchors, entries, references })
-    }
-
-    fn have_any_of(&self, map: &Survey) -> bool {
-        let is_there = |point: &[f64; 2]| {
-            self.references.iter().any(|base| base.data.vertices.index_of(*point).is_some())
-        };
-        map.data.vertices.coords().iter().any(is_there)
-    }
-
-    /// Returns whether there are neither bases nor anchors, so that the map is one part.
-    pub fn are_none(&self) -> bool {
-        self.entries.is_empty() && self.anchors.is_empty()
-    }
-
-    /// Returns what a record says about the bases, the anchors, and the parts that follow from them.
-    pub fn lineage(&self, parts: Vec<PartEntry>, census: Option<Census>) -> Lineage {
-        Lineage { parts, bases: self.entries.clone(), anchors: self.anchors.clone(), census }
-    }
-
-    /// Returns the series of the bases and a map that rests on them.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Series::new`].
-    pub fn series<'a>(
-        &'a self,
-        map: Map<'a>,
-        parameters: &'a Parameters,
-    ) -> meshmark_core::Result<Series<'a>> {
-        let number = |digest: &String| {
-            self.entries.iter().position(|entry| entry.vertices_sha256 == *digest).expect("it was checked")
-        };
-        let edition = |(entry, BaseMap { data, ground }): (&'a BaseEntry, &'a BaseMap)| Edition {
-            map: data.on(ground, ground),
-            bases: entry.bases.iter().map(number).collect(),
-            anchors: entry.anchors.as_slice(),
-        };
-        let mut editions: Vec<Edition> = self.entries.iter().zip(&self.references).map(edition).collect();
-        editions.push(Edition {
-            map,
-            bases: (0..self.entries.len()).collect(),
-            anchors: self.anchors.as_slice(),
-        });
-        Series::new(editions, parameters)
-    }
-
-    /// Returns a map with the vertices of its bases besides its own.
-    ///
-    /// # Errors
-    /// Fails where the maps span too much.
-    pub fn united(&self, map: &Survey) -> Result<Survey> {
-        let earlier: Vec<&MapData> = self.references.iter().map(|base| &base.data).collect();
-        let mut united = map.clone();
-        united.data = map.data.with_earlier(&earlier)?;
-        Ok(united)
+    let references = options.base_references.as_ref().ok_or(Error::NoBaseReference)?;
+    let references: Vec<PathBuf> = references.iter().map(PathBuf::from).collect();
+    let bases = Bases::find((entries, anchors), &references, read)?;
+    match bases.have_any_of(map) {
+        true => Ok(bases),
+        false => Err(Error::OtherBase { base: join_list(named) }.into()),
     }
 }
 

@@ -1,17 +1,9 @@
 //! Coordinate reference systems: metres per unit, labels, and the traditional axis order
 //! everywhere.
 
-use crate::{Error, Result, crs_wkt as wkt};
+use crate::{Result, crs_wkt as wkt};
 use gdal::spatial_ref::{AxisMappingStrategy, CoordTransform, SpatialRef};
-use meshmark_marking::{
-    Crs, CrsKind,
-    left_out::{MISSING, is_there},
-};
-
-/// The furthest coordinates that mean a place, in turns around the Earth: maps continue past the date
-/// line, and eastings may begin with the number of their zone.
-const FURTHEST_TURNS: f64 = 10.0;
-const EQUATOR_M: f64 = 40_075_017.0;
+use meshmark_marking::{Crs, CrsKind, Fault, TransformableCrs};
 
 /// Names of a CRS without a name.
 const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
@@ -19,15 +11,6 @@ const NO_NAMES: [&str; 3] = ["", "unknown", "unnamed"];
 /// The CRS of a map.
 #[derive(Debug, Clone)]
 pub struct CoordinateSystem(SpatialRef);
-
-/// An interpretation of the coordinates of a map.
-#[derive(Debug, Clone)]
-pub struct Assumption {
-    /// Their CRS.
-    pub crs: CoordinateSystem,
-    /// Whether x and y are exchanged in the file.
-    pub axes_swapped: bool,
-}
 
 impl CoordinateSystem {
     /// Wraps a CRS with the axes x = easting or longitude, y = northing or latitude.
@@ -48,29 +31,6 @@ impl CoordinateSystem {
         &self.0
     }
 
-    /// Returns the geographic CRS that it is or is a projection of.
-    fn geographic(&self) -> Option<CoordinateSystem> {
-        match self.0.is_geographic() {
-            true => Some(self.clone()),
-            false => self.0.geog_cs().ok().map(CoordinateSystem::new),
-        }
-    }
-
-    /// Returns the names of two different CRS for messages: brief names, with their definitions
-    /// where those are equal.
-    pub fn names_apart(&self, other: &CoordinateSystem) -> [String; 2] {
-        let names = [self, other].map(CoordinateSystem::brief_name);
-        if names[0] != names[1] {
-            return names;
-        }
-        [self, other].map(|crs| format!("{}, {}", names[0], crs.0.to_proj4().unwrap_or_default().trim()))
-    }
-
-    /// Returns whether both have the same x and y; heights do not matter to a map.
-    pub fn is_same(&self, other: &CoordinateSystem) -> bool {
-        self.0 == other.0 || self.horizontal().is_some_and(|own| Some(own) == other.horizontal())
-    }
-
     /// Returns the CRS of x and y alone, in this order.
     fn horizontal(&self) -> Option<SpatialRef> {
         let horizontal = SpatialRef::from_wkt(&wkt::horizontal(&self.0.to_wkt().ok()?)?).ok()?;
@@ -80,52 +40,6 @@ impl CoordinateSystem {
     /// Returns the transformation of coordinates from this CRS into `target`.
     pub(crate) fn transform_to(&self, target: &CoordinateSystem) -> gdal::errors::Result<CoordTransform> {
         CoordTransform::new(&self.0, &target.0)
-    }
-
-    /// Returns whether coordinates can mean a place in this CRS, and GDAL can transform them: it
-    /// subtracts turn after turn from a longitude, without end where a turn is less than the
-    /// precision of the number.
-    fn can_mean(&self, [x, y]: &[f64; 2]) -> bool {
-        let [most_x, most_y] = match self.0.is_geographic() {
-            true => {
-                [FURTHEST_TURNS * 360.0, 90.0].map(|degrees| degrees / self.0.angular_units().to_degrees())
-            }
-            false => [FURTHEST_TURNS * EQUATOR_M / self.0.linear_units(); 2],
-        };
-        x.abs() <= most_x && y.abs() <= most_y
-    }
-
-    /// Transforms points into another CRS; those without a place in both are then [`MISSING`].
-    fn transform(&self, points: &mut [[f64; 2]], target: &CoordinateSystem) -> gdal::errors::Result<()> {
-        let transform = self.transform_to(target)?;
-        let there: Vec<usize> = (0..points.len()).filter(|&i| self.can_mean(&points[i])).collect();
-        let (mut x, mut y): (Vec<f64>, Vec<f64>) =
-            there.iter().map(|&i| (points[i][0], points[i][1])).unzip();
-        // An error concerns some points only, which are then not finite.
-        let _ = transform.transform_coords(&mut x, &mut y, &mut []);
-        points.fill(MISSING);
-        there.into_iter().zip(x.into_iter().zip(y)).for_each(|(i, (x, y))| points[i] = [x, y]);
-        Ok(())
-    }
-
-    /// Converts points to degrees east of Greenwich and north, on the datum of this CRS; `None`
-    /// where it has no such place.
-    pub(crate) fn degrees(&self, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
-        let mut places = points.to_vec();
-        let Ok(geographic) = self.0.geog_cs().map(CoordinateSystem::new) else {
-            return vec![None; points.len()];
-        };
-        if !self.0.is_geographic() && self.transform(&mut places, &geographic).is_err() {
-            return vec![None; points.len()];
-        }
-        let prime_meridian = geographic.0.get_attr_value("PRIMEM", 1).ok().flatten();
-        let prime_meridian: f64 = prime_meridian.and_then(|text| text.parse().ok()).unwrap_or(0.0);
-        let unit = geographic.0.angular_units().to_degrees();
-        let place = |[x, y]: [f64; 2]| {
-            let place = [x * unit + prime_meridian, y * unit];
-            (place[0].is_finite() && place[1].abs() <= 90.0).then_some(place)
-        };
-        places.into_iter().map(place).collect()
     }
 }
 
@@ -171,6 +85,42 @@ impl Crs for CoordinateSystem {
     }
 }
 
+impl TransformableCrs for CoordinateSystem {
+    fn from_epsg(code: u32) -> Option<Self> {
+        SpatialRef::from_epsg(code).ok().map(CoordinateSystem::new)
+    }
+
+    fn is_same(&self, other: &CoordinateSystem) -> bool {
+        self.0 == other.0 || self.horizontal().is_some_and(|own| Some(own) == other.horizontal())
+    }
+
+    fn names_apart(&self, other: &CoordinateSystem) -> [String; 2] {
+        let names = [self, other].map(CoordinateSystem::brief_name);
+        if names[0] != names[1] {
+            return names;
+        }
+        [self, other].map(|crs| format!("{}, {}", names[0], crs.0.to_proj4().unwrap_or_default().trim()))
+    }
+
+    fn transform(&self, x: &mut [f64], y: &mut [f64], target: &Self) -> std::result::Result<(), Fault> {
+        // An error concerns some points only, which are then not finite.
+        let _ = self.transform_to(target)?.transform_coords(x, y, &mut []);
+        Ok(())
+    }
+
+    fn geographic(&self) -> Option<Self> {
+        match self.0.is_geographic() {
+            true => Some(self.clone()),
+            false => self.0.geog_cs().ok().map(CoordinateSystem::new),
+        }
+    }
+
+    fn prime_meridian_degrees(&self) -> f64 {
+        let prime_meridian = self.0.get_attr_value("PRIMEM", 1).ok().flatten();
+        prime_meridian.and_then(|text| text.parse().ok()).unwrap_or(0.0)
+    }
+}
+
 /// Returns the CRS of a map as marking takes it.
 pub fn as_crs(crs: &Option<CoordinateSystem>) -> Option<&dyn Crs> {
     crs.as_ref().map(|crs| crs as &dyn Crs)
@@ -186,30 +136,11 @@ pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
     Ok(CoordinateSystem::new(srs))
 }
 
-/// Reprojects coordinates into `target`; those of a layer without a CRS are assumed to be in it.
-/// Those without a place there are then [`MISSING`], and are returned as they were.
-pub(crate) fn reproject(
-    coords: &mut [[f64; 2]],
-    from: Option<&CoordinateSystem>,
-    target: &CoordinateSystem,
-    layer: &str,
-) -> Result<Vec<[f64; 2]>> {
-    let given = coords.to_vec();
-    if let Some(from) = from.filter(|from| !from.is_same(target)) {
-        let failed =
-            |error: gdal::errors::GdalError| Error::Reprojection { layer: layer.into(), source: error };
-        from.transform(coords, target).map_err(failed)?;
-    }
-    coords.iter_mut().filter(|point| !target.can_mean(point)).for_each(|point| *point = MISSING);
-    let lost = given.iter().zip(&*coords).filter(|(given, now)| is_there(given) && !is_there(now));
-    Ok(lost.map(|(given, _)| *given).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use meshmark_core::{ground::Ground, vertices::VertexTable};
-    use meshmark_marking::{Error, ground};
+    use meshmark_marking::{Error, degrees, ground};
 
     fn metres_per_unit(srs: &str, at: [f64; 2]) -> [f64; 2] {
         let table = VertexTable::new(vec![at]).unwrap();
@@ -287,7 +218,7 @@ mod tests {
         assert_eq!(at("EPSG:3903"), at("EPSG:3067"));
         let at = |srs| metres_per_unit(srs, [25.0, 60.0]);
         assert_eq!(at("EPSG:9518"), at("EPSG:4326"));
-        let places = |srs| parse_srs(srs).unwrap().degrees(&[[385_000.0, 6_672_000.0]])[0].unwrap();
+        let places = |srs| degrees(&parse_srs(srs).unwrap(), &[[385_000.0, 6_672_000.0]])[0].unwrap();
         let ([a, b], [c, d]) = (places("EPSG:3903"), places("EPSG:3067"));
         assert!((a - c).abs() < 1e-9 && (b - d).abs() < 1e-9, "{a} {b} {c} {d}");
     }

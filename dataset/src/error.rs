@@ -11,10 +11,7 @@ use std::{
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
     NoLayers,
-    UnknownLayer { name: String, known: String },
     Unreadable { layer: String, reason: String },
-    Reprojection { layer: String, source: GdalError },
-    FewPlaces { layer: String, crs: String },
     Traces(Vec<String>),
     UnknownFormat { named: Option<String>, extension: Option<String>, known: String },
     OneLayer { driver: &'static str },
@@ -36,7 +33,6 @@ pub enum Error {
     BaseOfThisEdition { base: PathBuf },
     BaseOfOtherParts { base: PathBuf },
     NoRecordOfBase { folder: PathBuf },
-    LostBase { vertices_sha256: String },
     OtherBase { base: String },
     BaseReferenceUnread { path: PathBuf, reason: String },
     SheetsUnread { plan: String, source: io::Error },
@@ -91,7 +87,6 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            Error::Reprojection { source, .. } => Some(source),
             Error::File { source, .. }
             | Error::BaseUnread { source, .. }
             | Error::SheetsUnread { source, .. } => Some(source),
@@ -124,17 +119,14 @@ impl From<meshmark_core::Error> for Error {
 impl Error {
     /// Returns whether a map lacks the layers or the CRS that options give it.
     pub fn is_of_other_layers(&self) -> bool {
-        matches!(
-            self,
-            Error::UnknownLayer { .. } | Error::Map(meshmark_marking::Error::ContradictingSrs { .. })
-        )
+        matches!(self, Error::Map(error) if error.is_of_other_layers())
     }
 
     /// Returns whether bases do not belong to a map, to its key or to each other.
     pub fn is_of_other_base(&self) -> bool {
         matches!(
             self,
-            Error::LostBase { .. }
+            Error::Map(meshmark_marking::Error::LostBase { .. })
                 | Error::OtherBase { .. }
                 | Error::ContradictingBase { .. }
                 | Error::BaseOfThisEdition { .. }
@@ -155,19 +147,8 @@ impl Error {
         let sheets = |plan: &str| spelling.value("SHEETS", plan);
         match self {
             Error::NoLayers => "the map has no vector layer: give a vector dataset that GDAL can open".into(),
-            Error::UnknownLayer { name, known } => {
-                format!("the map has no layer \"{name}\": {} may name {known}", spelling.name("LAYERS"))
-            }
             Error::Unreadable { layer, reason } => {
                 format!("layer \"{layer}\" cannot be read to its end: {reason}")
-            }
-            Error::Reprojection { layer, source } => {
-                format!(
-                    "coordinates of layer \"{layer}\" cannot be brought into the CRS of the reference: {source}"
-                )
-            }
-            Error::FewPlaces { layer, crs } => {
-                format!("most coordinates of layer \"{layer}\" have no place in {crs}: it is not their CRS")
             }
             Error::Traces(traces) => {
                 format!(
@@ -267,10 +248,6 @@ impl Error {
             Error::NoRecordOfBase { folder } => {
                 format!("{} is a folder without records: name the folder they were written to", base(folder))
             }
-            Error::LostBase { vertices_sha256 } => format!(
-                "no map given is the reference of a base whose vertices have the SHA-256 {vertices_sha256}: give its file, \
-                 unchanged, with those of all editions that the bases rest on"
-            ),
             Error::OtherBase { base: named } => format!(
                 "no vertex of the map is in the references of {}, so it is no edition of the same map: leave {} out, or \
                  name the records of its earlier editions",

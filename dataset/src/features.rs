@@ -2,18 +2,7 @@
 
 use crate::{CoordinateSystem, Error, Result, crs::as_crs, selection::chosen_layers, turns::turn};
 use gdal::{Dataset, vector::LayerAccess};
-use meshmark_marking::{self as marking, Extent, Outline};
-
-/// One geometry of a dataset.
-#[derive(Debug, Clone)]
-pub struct FeatureGeometry {
-    /// The name of its layer.
-    pub layer: String,
-    /// The feature's id, when it has one.
-    pub fid: Option<u64>,
-    /// The geometry.
-    pub outline: Outline,
-}
+use meshmark_marking::{self as marking, Extent, FeatureGeometry, Outline};
 
 /// Reads the geometries of all features of the chosen layers (all when `None`), in the order of the
 /// dataset, without features that have none. `last_failure` is as in [`crate::Selection`].
@@ -43,7 +32,7 @@ pub fn features(
                 let outline = Outline::of_wkb(wkb);
                 let outline = outline.map_err(|error| marking::Error::geometry(&name, id(), error))?;
                 outline.chains.iter().flatten().try_for_each(|&point| extent.check(point, &name, id))?;
-                all.push(FeatureGeometry { layer: name.clone(), fid, outline });
+                all.push(FeatureGeometry { layer: name.clone(), fid: id(), outline });
             }
         }
         if let Some(reason) = last_failure() {

@@ -4,7 +4,6 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-mod assumption;
 mod bases;
 mod crs;
 mod crs_wkt;
@@ -18,9 +17,7 @@ pub mod geojson_text;
 mod geometry_fault;
 pub mod geopackage;
 mod geos;
-mod labels;
 pub mod marked_view;
-mod polylines;
 pub mod publication;
 pub mod read_back;
 mod read_geometry;
@@ -32,11 +29,10 @@ pub mod traces;
 mod turns;
 pub mod workplace;
 
-pub use assumption::{likely_assumptions, overlaps};
-pub use bases::{Bases, ReadBase};
-pub use crs::{Assumption, CoordinateSystem, parse_srs};
+pub use bases::read_bases;
+pub use crs::{CoordinateSystem, parse_srs};
 pub use error::{Action, Error, Result, file_error};
-pub use features::{FeatureGeometry, features};
+pub use features::features;
 pub use file_digest::{digest_of_only_file, file_digest};
 pub use file_id::{FileId, same_file};
 pub use geos::GeosOfGdal;

@@ -3,6 +3,7 @@
 use crate::{Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
 use meshmark_core::options::join_list;
+use meshmark_marking as marking;
 
 /// The open options for any map. CSV files hold their coordinates as text, which would otherwise
 /// stay an attribute, and unmarked; layers of OpenStreetMap files must be read one at a time,
@@ -75,7 +76,7 @@ pub(crate) fn chosen_layers(dataset: &Dataset, wanted: Option<&[String]>) -> Res
         return Err(Error::NoLayers);
     }
     if let Some(name) = wanted.and_then(|wanted| wanted.iter().find(|name| !known.contains(name))) {
-        return Err(Error::UnknownLayer { name: name.clone(), known: join_list(&known) });
+        return Err(marking::Error::UnknownLayer { name: name.clone(), known: join_list(&known) }.into());
     }
     let is_wanted = |name: &String| wanted.is_none_or(|wanted| wanted.contains(name));
     Ok(known.into_iter().enumerate().filter(|(_, name)| is_wanted(name)).collect())

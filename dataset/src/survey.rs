@@ -2,71 +2,23 @@
 
 use crate::{
     CoordinateSystem, Error, Result,
-    crs::{as_crs, reproject},
-    labels, parse_srs, polylines,
+    crs::as_crs,
+    parse_srs,
     read_geometry::read_geometry,
     selection::{LabelFields, Selection, chosen_layers},
     turns::turn,
 };
 use gdal::{
     Dataset,
-    vector::{Feature, Layer, LayerAccess},
+    vector::{Feature, FieldValue, Layer, LayerAccess},
 };
-use meshmark_core::{
-    areas::Areas,
-    ground::Ground,
-    map::Map,
-    map_data::{Label, MapData, Polyline},
-    options::Parameters,
-};
-use meshmark_marking::{
-    self as marking, Chains, Crs, Extent, Faults, Geometries, LeftOut, Metric,
-    left_out::{MISSING, is_there},
-};
-use std::{collections::BTreeMap, ops::Range};
+use meshmark_marking::{self as marking, Chains, Content, Crs, Extent, Faults, TransformableCrs};
 
-/// Coordinates of which more than this share has no place in a CRS are in another one.
-const MOST_LOST: f64 = 0.1;
+/// A map that GDAL read.
+pub type Survey = marking::Survey<CoordinateSystem>;
 
-/// A map as marking and verification read it.
-#[derive(Debug, Clone)]
-pub struct Survey {
-    /// The data of the map.
-    pub data: MapData,
-    /// The CRS: the common one of the layers, or the target of a reprojection.
-    pub crs: Option<CoordinateSystem>,
-    metric: Metric,
-    /// The geometries in the order of reading, if they were requested.
-    pub geometries: Option<Geometries>,
-    /// The number of features of each layer read, by the number of the layer in the dataset.
-    pub features: BTreeMap<usize, u64>,
-    /// What is not in the data, of a map that is read with its faults.
-    pub left_out: LeftOut,
-}
-
-impl Survey {
-    /// Returns metres on the ground at the place of a vertex.
-    ///
-    /// # Errors
-    /// Fails with [`marking::Error::NoCrs`].
-    pub fn measure(&self) -> Result<&Ground> {
-        Ok(self.metric.local()?)
-    }
-
-    /// Returns its CRS as marking takes it.
-    pub fn crs(&self) -> Option<&dyn Crs> {
-        as_crs(&self.crs)
-    }
-
-    /// Returns the map as input of the algorithm. Marks of messages have one scale for a projected
-    /// map; fingerprints follow its ground.
-    ///
-    /// # Errors
-    /// Fails with [`marking::Error::NoCrs`].
-    pub fn map(&self, parameters: &Parameters) -> Result<Map<'_>> {
-        Ok(self.metric.map(&self.data, parameters)?)
-    }
-}
+/// The numbers of a dataset before they are brought into one CRS.
+pub type Numbers = marking::Numbers<CoordinateSystem>;
 
 /// Reads the vertices, the CRS and the labels of a dataset whose layers share one CRS.
 ///
@@ -75,7 +27,7 @@ impl Survey {
 /// coordinates that are not finite, and a CRS without a metric.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
     let Walk { found, crs, .. } = Walk::over(dataset, selection, true)?;
-    found.survey(crs.and_then(|(_, crs)| crs), selection.geometries)
+    Ok(found.survey(crs.and_then(|(_, crs)| crs), selection.geometries)?)
 }
 
 /// Reads the vertices and the labels of a dataset, whose layers may be in any CRS. Coordinates that
@@ -84,128 +36,7 @@ pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
 /// # Errors
 /// Fails on a layer that does not exist or cannot be read to its end.
 pub fn numbers(dataset: &Dataset, selection: &Selection) -> Result<Numbers> {
-    let Walk { mut found, parts, .. } = Walk::over(dataset, selection, false)?;
-    let points = found.labels.iter_mut().map(|label| &mut label.point);
-    let points = points.chain(found.polylines.iter_mut().flat_map(|line| &mut line.vertices));
-    points.filter(|point| !Extent::ANY.holds(point)).for_each(|point| *point = MISSING);
-    Ok(Numbers { found, parts })
-}
-
-/// The numbers of a dataset before they are brought into one CRS.
-#[derive(Clone)]
-pub struct Numbers {
-    found: Found,
-    parts: Vec<Part>,
-}
-
-impl Numbers {
-    /// Returns the map in this CRS; layers without a CRS are assumed to be in it. Coordinates
-    /// without a place there are left out.
-    ///
-    /// # Errors
-    /// Fails where most coordinates cannot be reprojected, and on a CRS without a metric.
-    pub fn in_crs(&self, target: &CoordinateSystem) -> Result<Survey> {
-        self.brought(target, None)
-    }
-
-    /// Returns the map in the CRS `target` as [`Numbers::in_crs`] does, with all numbers in another
-    /// CRS than the layers have, whose axes may be swapped.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Numbers::in_crs`].
-    pub fn assumed(
-        &self,
-        (crs, axes_swapped): (&CoordinateSystem, bool),
-        target: &CoordinateSystem,
-    ) -> Result<Survey> {
-        self.brought(target, Some((crs, axes_swapped)))
-    }
-
-    fn brought(
-        &self,
-        target: &CoordinateSystem,
-        assumed: Option<(&CoordinateSystem, bool)>,
-    ) -> Result<Survey> {
-        let mut found = self.found.clone();
-        for Part { layer, crs, coords, labels, polylines } in &self.parts {
-            let crs = assumed.map(|(crs, _)| crs).or(crs.as_ref());
-            let bring = |points: &mut [[f64; 2]]| {
-                if assumed.is_some_and(|(_, axes_swapped)| axes_swapped) {
-                    points.iter_mut().for_each(|point| point.swap(0, 1));
-                }
-                reproject(points, crs, target, layer)
-            };
-            let lost = bring(&mut found.chains.coords[coords.clone()])?;
-            let crs = || crs.unwrap_or(target).brief_name();
-            if lost.len() as f64 > MOST_LOST * coords.len() as f64 {
-                return Err(Error::FewPlaces { layer: layer.clone(), crs: crs() });
-            }
-            for point in lost {
-                found
-                    .left_out
-                    .coordinate(|| format!("layer \"{layer}\": {point:?} is no place in {}", crs()));
-            }
-            let labels = &mut found.labels[labels.clone()];
-            let mut points: Vec<[f64; 2]> = labels.iter().map(|label| label.point).collect();
-            bring(&mut points)?;
-            labels.iter_mut().zip(points).for_each(|(label, point)| label.point = point);
-            let polylines = &mut found.polylines[polylines.clone()];
-            let mut vertices: Vec<_> = polylines.iter().flat_map(|line| &line.vertices).copied().collect();
-            bring(&mut vertices)?;
-            let places = polylines.iter_mut().flat_map(|line| &mut line.vertices);
-            places.zip(vertices).for_each(|(place, vertex)| *place = vertex);
-        }
-        found.survey(Some(target.clone()), false)
-    }
-
-    /// Returns the map with its numbers unchanged and without a CRS.
-    ///
-    /// # Errors
-    /// Fails on too many coordinates.
-    pub fn raw(self) -> Result<Survey> {
-        self.found.survey(None, false)
-    }
-}
-
-/// A geometry column of a layer. The labels and polylines of a layer belong to its first column.
-#[derive(Clone)]
-struct Part {
-    layer: String,
-    crs: Option<CoordinateSystem>,
-    coords: Range<usize>,
-    labels: Range<usize>,
-    polylines: Range<usize>,
-}
-
-/// The content of a dataset in the order of reading.
-#[derive(Clone, Default)]
-struct Found {
-    chains: Chains,
-    labels: Vec<Label>,
-    polylines: Vec<Polyline>,
-    features: BTreeMap<usize, u64>,
-    left_out: LeftOut,
-    /// Whether polygons are kept feature by feature.
-    keeps_areas: bool,
-}
-
-impl Found {
-    fn survey(self, crs: Option<CoordinateSystem>, keeps_geometries: bool) -> Result<Survey> {
-        let Found { mut chains, mut labels, mut polylines, features, left_out, keeps_areas } = self;
-        chains.close_up();
-        labels.retain(|label| is_there(&label.point));
-        polylines.retain(|line| line.vertices.iter().all(is_there));
-        let coords = std::mem::take(&mut chains.coords);
-        let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
-        let areas = match keeps_areas {
-            true => Areas::new(&indices, &chains.starts, chains.chain_kinds(), &chains.firsts),
-            false => Areas::default(),
-        };
-        let data = MapData { areas, labels, polylines, ..data };
-        let metric = Metric::measure(as_crs(&crs), &data.vertices)?;
-        let geometries = keeps_geometries.then(|| Geometries::new(indices, chains));
-        Ok(Survey { data, crs, metric, geometries, features, left_out })
-    }
+    Ok(Walk::over(dataset, selection, false)?.found.into_numbers())
 }
 
 struct Walk<'a> {
@@ -214,15 +45,14 @@ struct Walk<'a> {
     in_one_crs: bool,
     /// The first layer with vertices, and its CRS.
     crs: Option<(String, Option<CoordinateSystem>)>,
-    found: Found,
-    parts: Vec<Part>,
+    found: Content<CoordinateSystem>,
 }
 
 impl<'a> Walk<'a> {
     fn over(dataset: &Dataset, selection: &'a Selection<'a>, in_one_crs: bool) -> Result<Self> {
         let keeps_areas = !matches!(selection.labels, LabelFields::None);
-        let found = Found { keeps_areas, ..Found::default() };
-        let mut walk = Walk { selection, in_one_crs, crs: None, found, parts: Vec::new() };
+        let found = Content::new(keeps_areas);
+        let mut walk = Walk { selection, in_one_crs, crs: None, found };
         for (index, name) in &chosen_layers(dataset, selection.layers)? {
             let _turn = turn(dataset, name)?;
             let features = walk.layer(&mut dataset.layer(*index)?, name)?;
@@ -234,7 +64,6 @@ impl<'a> Walk<'a> {
     /// Reads a layer and returns its number of features.
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<u64> {
         let columns = self.columns(layer)?;
-        let (mut first_label, mut first_polyline) = (self.found.labels.len(), self.found.polylines.len());
         let mut of_column = vec![Chains::default(); columns.len()];
         let mut features = 0;
         for feature in layer.features() {
@@ -263,21 +92,12 @@ impl<'a> Walk<'a> {
         if let Some(reason) = (self.selection.last_failure)() {
             return Err(Error::Unreadable { layer: name.into(), reason });
         }
-        for (crs, mut chains) in columns.into_iter().zip(of_column) {
+        for (crs, chains) in columns.iter().zip(&of_column) {
             if self.in_one_crs && !chains.coords.is_empty() {
-                self.check_crs(name, &crs)?;
+                self.check_crs(name, crs)?;
             }
-            let start = self.found.chains.coords.len();
-            self.found.chains.append(&mut chains);
-            self.parts.push(Part {
-                layer: name.into(),
-                crs,
-                coords: start..self.found.chains.coords.len(),
-                labels: first_label..self.found.labels.len(),
-                polylines: first_polyline..self.found.polylines.len(),
-            });
-            (first_label, first_polyline) = (self.found.labels.len(), self.found.polylines.len());
         }
+        self.found.end_layer(name, columns.into_iter().zip(of_column));
         Ok(features)
     }
 
@@ -299,8 +119,8 @@ impl<'a> Walk<'a> {
             return;
         }
         let Ok(geometry) = geometry.to_geo() else { return };
-        labels::of_feature(feature, &geometry, &self.selection.labels, &mut self.found.labels);
-        polylines::of_geometry(&geometry, &mut self.found.polylines);
+        let wanted = feature.fields().filter(|(name, _)| self.selection.labels.wants(name));
+        self.found.describe(wanted.filter_map(|(_, value)| text(value?)).collect(), &geometry);
     }
 
     /// Returns the CRS of every geometry column of a layer.
@@ -339,6 +159,16 @@ impl<'a> Walk<'a> {
         };
         let first = first.clone();
         Err(marking::Error::MixedCrs { first, first_crs, second: layer.into(), second_crs }.into())
+    }
+}
+
+/// Returns the text of an attribute that may be a label.
+fn text(value: FieldValue) -> Option<String> {
+    match value {
+        FieldValue::StringValue(text) => Some(text),
+        FieldValue::IntegerValue(number) => Some(number.to_string()),
+        FieldValue::Integer64Value(number) => Some(number.to_string()),
+        _ => None,
     }
 }
 

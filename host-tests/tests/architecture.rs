@@ -12,10 +12,11 @@ use std::{
     path::Path,
 };
 
-const CRATES: [&str; 11] = [
+const CRATES: [&str; 12] = [
     "core",
     "detection",
     "marking",
+    "verification",
     "dataset",
     "plugin",
     "verifier",

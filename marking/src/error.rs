@@ -7,6 +7,7 @@ use std::fmt;
 #[derive(Debug)]
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
+    UnknownLayer { name: String, known: String },
     MixedCrs { first: String, first_crs: String, second: String, second_crs: String },
     NoCrs,
     ContradictingSrs { crs: String, srs: String },
@@ -18,11 +19,14 @@ pub enum Error {
     TooLarge { most: usize },
     TooSmall { size_m: f64, tolerance_m: f64 },
     UnevenScale { ends: [[f64; 2]; 2], off_percent: f64, crs: String },
+    Reprojection { layer: String, source: Fault },
+    FewPlaces { layer: String, crs: String },
+    LostBase { vertices_sha256: String },
     Core(meshmark_core::Error),
 }
 
-/// The fault of a geometry, of its bytes or of the library that has it.
-type Fault = Box<dyn std::error::Error + Send + Sync>;
+/// The fault of a library, or of the bytes of a geometry.
+pub type Fault = Box<dyn std::error::Error + Send + Sync>;
 
 /// The result of every fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -36,7 +40,7 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            Error::Geometry { source, .. } => Some(&**source),
+            Error::Geometry { source, .. } | Error::Reprojection { source, .. } => Some(&**source),
             Error::Core(source) => Some(source),
             _ => None,
         }
@@ -59,12 +63,21 @@ impl Error {
     /// be read.
     pub fn is_about_options(&self) -> bool {
         match self {
-            Error::MixedCrs { .. } | Error::NoCrs | Error::Geocentric(_) | Error::Core(_) => true,
+            Error::UnknownLayer { .. }
+            | Error::MixedCrs { .. }
+            | Error::NoCrs
+            | Error::Geocentric(_)
+            | Error::Core(_) => true,
             Error::ContradictingSrs { .. } | Error::UnknownSrs(_) => true,
-            Error::TooSmall { .. } | Error::UnevenScale { .. } => true,
+            Error::TooSmall { .. } | Error::UnevenScale { .. } | Error::Reprojection { .. } => true,
             Error::NotFinite { .. } | Error::TooFar { .. } | Error::Geometry { .. } => false,
-            Error::TooLarge { .. } => false,
+            Error::TooLarge { .. } | Error::FewPlaces { .. } | Error::LostBase { .. } => false,
         }
+    }
+
+    /// Returns whether a map lacks the layers or the CRS that options give it.
+    pub fn is_of_other_layers(&self) -> bool {
+        matches!(self, Error::UnknownLayer { .. } | Error::ContradictingSrs { .. })
     }
 
     /// Returns the fault of a feature without the remedy.
@@ -84,6 +97,9 @@ impl Error {
     /// Returns the message, with options spelled as in the user's front end.
     pub fn text(&self, spelling: Spelling) -> String {
         match self {
+            Error::UnknownLayer { name, known } => {
+                format!("the map has no layer \"{name}\": {} may name {known}", spelling.name("LAYERS"))
+            }
             Error::MixedCrs { first, first_crs, second, second_crs } => format!(
                 "layers \"{first}\" ({first_crs}) and \"{second}\" ({second_crs}) are not in the same CRS, and a mark \
                  needs one: choose layers of one CRS with {}, or reproject first",
@@ -133,6 +149,16 @@ impl Error {
                 longest[1],
                 spelling.name("CODE"),
                 spelling.name("CHIP_RATE")
+            ),
+            Error::Reprojection { layer, source } => format!(
+                "coordinates of layer \"{layer}\" cannot be brought into the CRS of the reference: {source}"
+            ),
+            Error::FewPlaces { layer, crs } => {
+                format!("most coordinates of layer \"{layer}\" have no place in {crs}: it is not their CRS")
+            }
+            Error::LostBase { vertices_sha256 } => format!(
+                "no map given is the reference of a base whose vertices have the SHA-256 {vertices_sha256}: give its file, \
+                 unchanged, with those of all editions that the bases rest on"
             ),
             Error::Core(error) => error.text(spelling),
         }

@@ -4,6 +4,7 @@ use crate::{
     chains::Chains,
     wkb::{self, Step, WkbError},
 };
+use geo::{Geometry, GeometryCollection, LineString, Point, Polygon};
 use std::{borrow::Cow, collections::BTreeMap};
 
 /// A geometry.
@@ -61,10 +62,42 @@ impl Outline {
         self.wkb.as_deref().is_none_or(wkb::is_plain)
     }
 
+    /// Returns its points, lines and polygons as a collection; lines of one vertex are points.
+    pub fn to_collection(&self) -> Geometry {
+        let line = |chain: &Vec<[f64; 2]>| chain.iter().map(|&[x, y]| (x, y)).collect::<LineString>();
+        let mut rest = self.chains.iter().zip(&self.kinds).peekable();
+        let mut parts: Vec<Geometry> = Vec::new();
+        while let Some((chain, kind)) = rest.next() {
+            parts.push(match (kind, chain.as_slice()) {
+                (Step::Shell, _) => {
+                    let mut holes = Vec::new();
+                    while let Some((hole, _)) = rest.next_if(|(_, kind)| **kind == Step::Hole) {
+                        holes.push(line(hole));
+                    }
+                    Polygon::new(line(chain), holes).into()
+                }
+                (_, &[[x, y]]) => Point::new(x, y).into(),
+                _ => line(chain).into(),
+            });
+        }
+        Geometry::GeometryCollection(GeometryCollection(parts))
+    }
+
     /// Returns its first vertex.
     pub fn first(&self) -> Option<[f64; 2]> {
         self.chains.first()?.first().copied()
     }
+}
+
+/// One geometry of a map, for comparing two maps feature by feature.
+#[derive(Debug, Clone)]
+pub struct FeatureGeometry {
+    /// The name of its layer.
+    pub layer: String,
+    /// The name of its feature for messages.
+    pub fid: String,
+    /// The geometry.
+    pub outline: Outline,
 }
 
 /// The geometries of a map as references to its vertices, a few bytes for every coordinate.

@@ -19,13 +19,18 @@ use meshmark_core::{
     recorded::Recorded,
 };
 use meshmark_dataset::{
-    Bases, GeosOfGdal, LabelFields, MOST_VERTICES, Selection, Survey,
+    GeosOfGdal, LabelFields, MOST_VERTICES, Selection, Survey,
     decimals::Digits,
-    same_file, survey,
+    read_bases, same_file, survey,
     traces::{self, ForeignMembers},
 };
-use meshmark_marking::{self as marking, Lineage, Moves, ThreadPool, Unmarked, damage_warning, exposure};
-use std::{fs::File, path::Path};
+use meshmark_marking::{
+    self as marking, Bases, Lineage, Moves, ThreadPool, Unmarked, damage_warning, exposure,
+};
+use std::{
+    fs::File,
+    path::{Path, PathBuf},
+};
 
 /// The noise that the estimates from a file that was read back assume, metres.
 const READ_BACK_NOISE_M: f64 = 0.01;
@@ -184,7 +189,7 @@ impl Marking {
         let on_ground = map.map(&options.parameters)?;
         marking::check_extent(&on_ground, &options.parameters)?;
         marking::check_scale(&on_ground, map.crs())?;
-        let mut read = |path: &Path, entry: &BaseEntry| {
+        let mut read = |path: &PathBuf, entry: &BaseEntry| {
             let selection = Selection { geometries: false, ..selection(options, source.last_failure) };
             let (layers, srs) = (entry.layers.as_deref(), entry.srs.as_deref());
             match (source.read_base)(path, &Selection { layers, srs, ..selection }) {
@@ -192,7 +197,7 @@ impl Marking {
                 read => read.map(Some),
             }
         };
-        let bases = Bases::of_options(options, &request.key, &map, &mut read)?;
+        let bases = read_bases(options, &request.key, &map, &mut read)?;
         let pool = pool(threads)?;
         let (marked, lineage) = pool.install(|| request.embed(on_ground, &bases))?;
         let parameters = &options.parameters;

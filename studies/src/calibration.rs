@@ -21,7 +21,7 @@ use meshmark_host_tests::{
     attacks::{Map, Random, noise},
     product::{Marking, Product, Profile, random_key},
 };
-use meshmark_verifier::verify::{FingerprintEvidence, Found, Sought};
+use meshmark_verification::verify::{FingerprintEvidence, Found, Sought};
 use plotters::style::{BLUE, RED};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -22,12 +22,11 @@ use meshmark_host_tests::{
     attacks::{Attack, Map, OtherMaps, Random, extended_rows, noise, paper_rows},
     product::{Marking, Product, Profile, random_key},
 };
-use meshmark_verifier::{
-    Request,
-    inputs::private_copy::PrivateCopy,
-    progress::Progress,
-    verify::{self, Found, Sought},
+use meshmark_verification::{
+    Maps, Stages,
+    verify::{self, Found, Request, Settings, Sought},
 };
+use meshmark_verifier::inputs::{map_files::MapFiles, private_copy::PrivateCopy};
 use plotters::style::{BLACK, BLUE, RED};
 use serde::Serialize;
 use std::{
@@ -121,19 +120,8 @@ pub(crate) fn examine(
     sought: Sought,
     parameters: Parameters,
 ) -> Result<std::result::Result<Found, String>> {
-    let request = Request {
+    let settings = Settings {
         key: key.clone(),
-        reference: reference.into(),
-        suspect: PrivateCopy::make("suspect", suspect)?,
-        record: None,
-        subject: None,
-        sought,
-        lineage: Default::default(),
-        tried: 1,
-        parameters,
-        layers: None,
-        srs: None,
-        landmarks: Vec::new(),
         registration: Start::Auto,
         demodulator: Demodulator::Joint,
         radius: RadiusChoice::FromData,
@@ -142,9 +130,23 @@ pub(crate) fn examine(
         evidence_map: false,
         exact_displacements: false,
     };
-    let mut progress = Progress::default();
-    let map = verify::read_reference(&request, &mut progress)?.or_fail()?;
-    Ok(verify::examine(&request, (&map, &Default::default()), &mut progress)?.or_fail()?.found)
+    let request = Request {
+        settings,
+        record: None,
+        subject: None,
+        sought,
+        lineage: Default::default(),
+        tried: 1,
+        parameters,
+        layers: None,
+        srs: None,
+    };
+    let suspect = PrivateCopy::make("suspect", suspect)?;
+    let mut maps = MapFiles { references: vec![reference.into()], suspect, landmarks: Vec::new() };
+    let mut stages = Stages::new(&|_| ());
+    let map = verify::read_reference(&mut maps, 0, &request, &mut stages)?.or_fail()?;
+    let map = (&map, maps.name(0), &Default::default());
+    Ok(verify::examine(&mut maps, &request, map, &mut stages)?.or_fail()?.found)
 }
 
 fn decide(found: &Demodulation, carried: Message) -> Decision {

@@ -1,13 +1,10 @@
 //! The index of copies: who received which copy of which edition, from the records of a folder.
 
-use crate::{
-    Error, Result,
-    inputs::texts::{self, ReadRecord},
-    words::printable,
-};
+use crate::{Error, Result, inputs::texts};
 use der::DateTime;
 use meshmark_core::recorded::Recorded;
 use meshmark_dataset::{file_digest, formats::Format};
+use meshmark_verification::{verify::ReadRecord, words::printable};
 use serde::Serialize;
 use std::{
     collections::BTreeMap,

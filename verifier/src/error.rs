@@ -24,10 +24,10 @@ pub enum Error {
     Core(#[from] meshmark_core::Error),
     #[error("{}", .0.text(Spelling::Flag))]
     Dataset(#[from] MapError),
+    #[error("{}", .0.text(Spelling::Flag))]
+    Verification(#[from] meshmark_verification::Error),
     #[error("the {what} {}: {}", path.display(), source.text(Spelling::Flag))]
     Map { what: &'static str, path: PathBuf, source: Box<MapError> },
-    #[error("the reference {}: {}", path.display(), source.text(Spelling::Flag))]
-    Unfit { path: PathBuf, source: Box<MapError> },
     #[error("the map {}: {}", path.display(), source.text(Spelling::Flag))]
     Refused { path: PathBuf, source: Box<MapError> },
     #[error("{}: {source}", path.display())]
@@ -72,8 +72,6 @@ pub enum Error {
     NotBundled { path: PathBuf, reason: String },
     #[error("the folder {} cannot be read: {source}", path.display())]
     FolderUnread { path: PathBuf, source: io::Error },
-    #[error("{flag} contradicts the record: leave one of them out")]
-    Contradiction { flag: String },
     #[error("the map {} is a marked view already: name the dataset itself", path.display())]
     MarkedView { path: PathBuf },
     #[error("the reference {} has no field \"{field}\": --landmark may name {known}", path.display())]
@@ -120,22 +118,11 @@ pub enum Error {
     #[error("--time-stamp-request has nothing to answer it: give the response to it with --time-stamp")]
     NoAnswer,
     #[error(
-        "the reference has {} and the marked map {marked}: compare a map with the copy that was marked from it, before \
-         anything is removed",
-        counted(*reference, "geometry")
-    )]
-    OtherCount { reference: usize, marked: usize },
-    #[error(
         "the marked map {} is in {other} and the reference in {own}: compare the copy that was marked, before it is brought \
          into another CRS",
         path.display()
     )]
     OtherCrs { path: PathBuf, own: String, other: String },
-    #[error(
-        "layer \"{layer}\", feature {fid} of the reference does not have the vertices of its counterpart in the marked map \
-         (layer \"{other}\"): features correspond by their order"
-    )]
-    OtherVertices { layer: String, fid: String, other: String },
     #[error("the list of recipients {} {reason}", path.display())]
     Recipients { path: PathBuf, reason: String },
     #[error("the {what} {} {reason}", path.display())]
@@ -157,40 +144,6 @@ pub enum Error {
 
     // --- what does not belong together ---
     #[error(
-        "the record was made with key {made_with}, and this is key {given}: give the key it was made with"
-    )]
-    OtherKey { made_with: String, given: String },
-    #[error("the record was made with another key than this one, {given}: give the key it was made with")]
-    OtherCommitment { given: String },
-    #[error(
-        "the record names {} that are not the vertices of its reference: verify with the version of meshmark that wrote it",
-        counted(*parts, "part")
-    )]
-    OtherParts { parts: usize },
-    #[error(
-        "the {} of the record are not those of its reference, its bases and its anchors: give the files of all editions, unchanged, or \
-         verify with the version of meshmark that wrote it",
-        counted(*parts, "part")
-    )]
-    OtherPartsOfBases { parts: usize },
-    #[error(
-        "the demodulator of the paper reads messages, and the mark is the fingerprint of a recipient: leave --demodulator \
-         out"
-    )]
-    PaperOfFingerprint,
-    #[error("the record's message is not that of its recipient under this key: the record was changed")]
-    OtherMessage,
-    #[error(
-        "the record was made from another reference ({recorded} vertices) than {} ({vertices} vertices): give the file \
-         that was marked, unchanged",
-        path.display()
-    )]
-    OtherReference { path: PathBuf, recorded: usize, vertices: usize },
-    #[error(
-        "the record was made from none of the {references} references given: give the file that was marked, unchanged"
-    )]
-    NoReferenceOfRecord { references: usize },
-    #[error(
         "the {what} is not in the deposit: it was chosen or changed after the deposit, or belongs to another one; give the \
          files that were deposited, unchanged"
     )]
@@ -203,10 +156,6 @@ pub enum Error {
     NoAuthorities { path: PathBuf },
     #[error("the deposit {} {source}", path.display())]
     Deposit { path: PathBuf, source: DepositFault },
-    #[error(
-        "there are several references, and no record to choose one by: give --record or --records, or one --reference"
-    )]
-    SeveralReferences,
 
     // --- inputs that cannot be read ---
     #[error("the {what} {} cannot be opened: {source}", path.display())]
@@ -328,6 +277,12 @@ pub enum Error {
     Stopped { source: Box<Error>, done: usize, all: usize },
 }
 
+impl From<marking::Error> for Error {
+    fn from(error: marking::Error) -> Self {
+        Error::Dataset(error.into())
+    }
+}
+
 /// A failure of a library in one of many steps of a piece of work.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
@@ -356,7 +311,7 @@ impl Error {
         use MapError::*;
         let Error::Map { source, .. } = self else { return false };
         match &**source {
-            NoLayers | UnknownLayer { .. } | Reprojection { .. } => true,
+            NoLayers => true,
             Map(fault) => fault.is_about_options(),
             _ => false,
         }
@@ -371,18 +326,12 @@ impl Error {
                 ExitCode::Unwritable
             }
             Dataset(error) if error.is_of_other_base() => ExitCode::DoesNotBelong,
+            Verification(error) if error.is_of_others() => ExitCode::DoesNotBelong,
             NotDeposited { .. }
             | NotRepeated { .. }
-            | OtherKey { .. }
-            | OtherCommitment { .. }
-            | OtherParts { .. }
-            | OtherPartsOfBases { .. }
-            | OtherMessage
             | SheetsOfOtherCrs { .. }
             | SameSheet { .. }
-            | SheetsDisagree { .. }
-            | OtherReference { .. }
-            | NoReferenceOfRecord { .. } => ExitCode::DoesNotBelong,
+            | SheetsDisagree { .. } => ExitCode::DoesNotBelong,
             TextUnread { .. }
             | FolderUnread { .. }
             | NoBundle { .. }
@@ -421,10 +370,8 @@ impl Error {
 fn of_map_that_is_read(error: &MapError) -> ExitCode {
     match error {
         MapError::Map(marking::Error::TooLarge { .. }) => ExitCode::TooLarge,
-        MapError::UnknownLayer { .. }
-        | MapError::Map(marking::Error::UnknownSrs(_) | marking::Error::ContradictingSrs { .. }) => {
-            ExitCode::Usage
-        }
+        MapError::Map(marking::Error::UnknownSrs(_)) => ExitCode::Usage,
+        error if error.is_of_other_layers() => ExitCode::Usage,
         _ => ExitCode::Unreadable,
     }
 }

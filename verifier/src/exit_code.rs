@@ -1,5 +1,7 @@
 //! The exit codes of the command.
 
+use meshmark_detection::decision::Verdict;
+
 /// An exit code of the command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExitCode {
@@ -22,6 +24,16 @@ pub enum ExitCode {
     Unwritable = 7,
     /// A limit, or a fault of a library, ended the examination.
     Stopped = 8,
+}
+
+impl From<Verdict> for ExitCode {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Match => ExitCode::Match,
+            Verdict::NoMatch => ExitCode::NoMatch,
+            Verdict::Inconclusive => ExitCode::Inconclusive,
+        }
+    }
 }
 
 impl ExitCode {

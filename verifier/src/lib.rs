@@ -1,8 +1,7 @@
 //! The verifier decides whether a suspect is a copy of a given marked map.
 //!
-//! The data flows one way: [`inputs`] → [`verify`](mod@verify), which passes numbers to
-//! `meshmark-detection` → [`report`] → [`html`] → [`outputs`]. [`compare`] measures the effect of marking on a
-//! map, [`distribute`] marks a map for many recipients, [`sheets`] plans sheets that are marked apart,
+//! The data flows one way: [`inputs`] → `meshmark-verification` → [`outputs`]. [`compare`] measures the effect
+//! of marking on a map, [`distribute`] marks a map for many recipients, [`sheets`] plans sheets that are marked apart,
 //! [`copies_index`] lists who received which copy. [`confinement`] has the process that examines a
 //! suspect.
 #![forbid(unsafe_code)]
@@ -15,17 +14,12 @@ pub mod deposit;
 pub mod distribute;
 mod error;
 mod exit_code;
-pub mod html;
 pub mod inputs;
 pub mod outputs;
 pub mod progress;
-pub mod report;
 pub mod sheets;
-mod thinning;
 pub mod time_stamp;
-pub mod verify;
 pub mod words;
 
 pub use error::{Cause, Error, Result};
 pub use exit_code::ExitCode;
-pub use verify::{Request, verify, verify_records};

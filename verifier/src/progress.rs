@@ -2,8 +2,7 @@
 //! no terminal: it passes its progress to its parent, line by line.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use meshmark_detection::{Listener, Progress as Event};
-use std::{collections::BTreeMap, sync::Mutex, time::Instant};
+use meshmark_detection::Progress as Event;
 
 const STAGE: &str = "stage ";
 const STEPS: &str = "steps ";
@@ -56,68 +55,53 @@ enum Display {
     Parent,
 }
 
-/// Shows the current stage and records the duration of each.
-pub struct Progress {
-    display: Display,
-    stage: Option<(&'static str, Instant)>,
-    seconds: BTreeMap<&'static str, f64>,
-}
+/// Shows the current stage.
+#[derive(Clone)]
+pub struct Progress(Display);
 
 impl Default for Progress {
     fn default() -> Self {
-        Progress::on(Display::Bar(Bar::default()))
+        Progress(Display::Bar(Bar::default()))
     }
 }
 
 impl Progress {
-    fn on(display: Display) -> Self {
-        Progress { display, stage: None, seconds: BTreeMap::new() }
-    }
-
     /// Creates the progress of a child, whose parent shows it.
     pub fn of_child() -> Self {
-        Progress::on(Display::Parent)
+        Progress(Display::Parent)
     }
 
-    /// Starts a stage of `steps` steps (0: unknown) and ends the previous one.
-    pub fn start(&mut self, stage: &'static str, steps: u64) {
-        self.finish();
-        self.stage = Some((stage, Instant::now()));
-        match &self.display {
-            Display::Bar(bar) => bar.start(stage, steps),
+    /// Starts a stage of `steps` steps (0: unknown).
+    pub fn start(&self, stage: &str, steps: u64) {
+        match &self.0 {
+            Display::Bar(bar) => {
+                bar.finish();
+                bar.start(stage, steps);
+            }
             Display::Parent => eprintln!("{STAGE}{steps} {stage}"),
         }
     }
 
-    /// Returns a function that counts steps; any thread may call it.
-    pub fn stepper(&self) -> impl Fn(usize) + Sync + use<> {
-        let display = self.display.clone();
-        move |steps| match &display {
+    /// Counts steps.
+    pub fn step(&self, steps: usize) {
+        match &self.0 {
             Display::Bar(Bar(bar)) => bar.inc(steps as u64),
             Display::Parent => eprintln!("{STEPS}{steps}"),
         }
     }
 
-    /// Runs `work`, which reports its stages and steps.
-    pub fn listen<T>(&mut self, work: impl FnOnce(Listener) -> T) -> T {
-        let step = self.stepper();
-        let stages = Mutex::new(self);
-        work(&|event| match event {
-            Event::Stage { stage, steps } => {
-                stages.lock().expect("nobody panics with it").start(stage, steps)
-            }
-            Event::Steps(steps) => step(steps),
-        })
+    /// Shows an event of a verification.
+    pub fn show(&self, event: Event) {
+        match event {
+            Event::Stage { stage, steps } => self.start(stage, steps),
+            Event::Steps(steps) => self.step(steps),
+        }
     }
 
-    /// Ends the last stage and clears the line; returns the seconds by stage.
-    pub fn finish(&mut self) -> &BTreeMap<&'static str, f64> {
-        if let Some((stage, since)) = self.stage.take() {
-            *self.seconds.entry(stage).or_default() += since.elapsed().as_secs_f64();
-        }
-        if let Display::Bar(bar) = &self.display {
+    /// Clears the line.
+    pub fn finish(&self) {
+        if let Display::Bar(bar) = &self.0 {
             bar.finish();
         }
-        &self.seconds
     }
 }

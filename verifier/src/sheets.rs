@@ -7,7 +7,6 @@ use crate::{
     Error, Result,
     inputs::maps::{self, Reading},
     progress::Progress,
-    words::printable,
 };
 use meshmark_core::{
     anchors::Anchors,
@@ -16,7 +15,8 @@ use meshmark_core::{
     sheet_plan::{PlannedSheet, SheetPlan, VERSION},
 };
 use meshmark_dataset::{CoordinateSystem, LabelFields, Survey, formats::Format};
-use meshmark_marking::Crs;
+use meshmark_marking::{Crs, TransformableCrs};
+use meshmark_verification::words::printable;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -40,7 +40,7 @@ struct Known {
 pub fn plan(
     options: &Options,
     named: &[PathBuf],
-    progress: &mut Progress,
+    progress: &Progress,
     warn: &mut dyn FnMut(&str),
 ) -> Result<SheetPlan> {
     let files = files(named, warn)?;
@@ -48,7 +48,7 @@ pub fn plan(
         return Err(Error::OneSheet { path: only.clone() });
     }
     progress.start("reading sheets", 2 * files.len() as u64);
-    let step = progress.stepper();
+    let step = |steps| progress.step(steps);
     let mut sheets: Vec<Known> = Vec::new();
     for path in files {
         let sheet = Known::read(path, options)?;

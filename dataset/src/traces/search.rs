@@ -7,7 +7,6 @@ use super::{
 };
 use crate::{
     CoordinateSystem, Error, Result, Survey,
-    crs::reproject,
     geojson_text::{has_foreign_places, without_places},
     read_geometry::read_geometry,
     selection::chosen_layers,
@@ -18,7 +17,7 @@ use gdal::{
     vector::{Feature, FieldValue, Layer, LayerAccess, OGRFieldType},
 };
 use meshmark_core::options::Options;
-use meshmark_marking::{Chains, Extent, Faults, LeftOut};
+use meshmark_marking::{Chains, Extent, Faults, LeftOut, reproject};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Values further apart in a text, or in a list, are no pair: `x1, 2.5, y1, 3.5` has a number between

@@ -1,7 +1,8 @@
 //! The places near vertices, and how often any other places would be there.
 
-use crate::{CoordinateSystem, Result, Survey, crs::reproject, parse_srs};
+use crate::{CoordinateSystem, Result, Survey, parse_srs};
 use gdal::spatial_ref::CoordTransform;
+use meshmark_marking::{TransformableCrs, reproject};
 use statrs::function::gamma::gamma_lr;
 use std::{cell::OnceCell, collections::HashSet, ops::RangeInclusive};
 

@@ -4,10 +4,10 @@ use super::{JSON, MANIFEST, PAGE};
 use crate::{
     Error, Result,
     inputs::{digests, texts::possible_records, versions::versions_and_program},
-    words::printable,
 };
 use meshmark_core::{counted, hex};
 use meshmark_dataset::file_digest;
+use meshmark_verification::words::printable;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Component, Path, PathBuf};

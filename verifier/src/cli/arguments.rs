@@ -5,6 +5,7 @@ use clap::{
 };
 use meshmark_core::options::{OPTIONS, OptionSpec, Spelling};
 use meshmark_detection::{Demodulator, registration::Start};
+use meshmark_verification::verify::LARGEST_SIGNIFICANCE;
 use meshmark_verifier::{ExitCode, inputs::passphrase::Passphrase};
 use std::path::PathBuf;
 
@@ -460,9 +461,6 @@ fn positive(text: &str) -> std::result::Result<f64, String> {
         _ => Err("give a number greater than 0".into()),
     }
 }
-
-/// A match at a larger significance is no evidence.
-const LARGEST_SIGNIFICANCE: f64 = 1e-3;
 
 fn probability(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {

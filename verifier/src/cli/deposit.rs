@@ -5,14 +5,14 @@ use super::{
     printing::{print, warn},
 };
 use meshmark_core::counted;
+use meshmark_verification::{report::Standing, words::printable};
 use meshmark_verifier::{
     Error, Result,
     deposit::{self, Deposit, DepositFiles, Deposited, Opened, Predicate, SigningKey, signing_key_file},
     inputs::texts,
     outputs::NewFile,
-    report::Standing,
     time_stamp::{self, TimeStamp},
-    words::{printable, quoted},
+    words::quoted,
 };
 use std::path::Path;
 

@@ -13,11 +13,15 @@ use crate::package_files;
 use arguments::{Cli, CompareArgs, DistributeArgs, PlanArgs, Subcommands};
 use clap::{CommandFactory, Parser};
 use meshmark_core::{counted, options::Options, sheet_plan::PlannedSheet};
+use meshmark_verification::{
+    compare::{Comparison, Details},
+    html,
+};
 use meshmark_verifier::{
     Error, Result,
-    compare::{Comparison, Details, compare, detail::ComparedFiles},
+    compare::{compare, compared_files},
     copies_index::{self, IndexedCopy},
-    distribute, html,
+    distribute,
     inputs::{gdal_failures, texts},
     outputs::{Format, NewFile, ReportFile},
     progress::Progress,
@@ -66,7 +70,7 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
     let file = args.report.as_deref().map(ReportFile::new).transpose()?;
     let provenance = file
         .as_ref()
-        .map(|_| ComparedFiles::read(&args.reference, &args.marked, command_line::own()))
+        .map(|_| compared_files(&args.reference, &args.marked, command_line::own()))
         .transpose()?;
     let details = match (&file, args.exact_displacements) {
         (None, _) => Details::None,
@@ -98,7 +102,7 @@ fn run_distribute(args: DistributeArgs) -> Result<()> {
         folder: args.output_dir,
         format: args.format,
     };
-    let done = distribute::distribute(&request, &mut Progress::default(), &mut warn)?;
+    let done = distribute::distribute(&request, &Progress::default(), &mut warn)?;
     let before = match done.finished_before {
         0 => String::new(),
         count => format!(", {} there already", counted(count, "copy")),
@@ -113,7 +117,7 @@ fn plan_sheets(args: &PlanArgs) -> Result<()> {
     let flags = [("LAYERS", layers), ("SRS", srs), ("TOLERANCE", tolerance)];
     let given = flags.iter().filter_map(|(name, value)| Some((*name, value.as_deref()?)));
     let options = Options::parse_for_recipients(given)?;
-    let plan = sheets::plan(&options, named, &mut Progress::default(), &mut warn)?;
+    let plan = sheets::plan(&options, named, &Progress::default(), &mut warn)?;
     file.write(plan.to_json().as_bytes())?;
     let count = |number: fn(&PlannedSheet) -> usize| plan.sheets.iter().map(number).sum::<usize>();
     print(&format!(

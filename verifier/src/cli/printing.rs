@@ -1,6 +1,7 @@
 //! What the command prints: answers to stdout, warnings to stderr.
 
-use meshmark_verifier::{Error, Result, words::printable};
+use meshmark_verification::words::printable;
+use meshmark_verifier::{Error, Result};
 use std::io::{ErrorKind, Write};
 
 /// The beginning of every warning.

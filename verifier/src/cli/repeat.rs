@@ -2,7 +2,8 @@
 
 use super::{arguments::RepeatArgs, command_line, printing::print};
 use meshmark_core::counted;
-use meshmark_verifier::{Error, Result, bundle::Bundle, words::printable};
+use meshmark_verification::words::printable;
+use meshmark_verifier::{Error, Result, bundle::Bundle};
 use std::process::{Command, Stdio};
 
 pub(super) fn run(args: &RepeatArgs) -> Result<()> {

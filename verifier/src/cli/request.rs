@@ -1,115 +1,28 @@
-//! The request of `verify`, made from flags, key and record.
+//! The requests of `verify`, made from flags, key and record.
 
 use super::{arguments::VerifyArgs, printing::warn};
-use meshmark_core::{
-    key::{RECIPIENT_BITS, SecretKey},
-    options::{Options, Spelling, Subject},
-    recorded::Recorded,
-};
-use meshmark_detection::{Demodulator, matching::RadiusChoice};
+use meshmark_detection::matching::RadiusChoice;
+use meshmark_verification::verify::{self, Request, Settings};
 use meshmark_verifier::{
-    Error, Request, Result,
-    inputs::{
-        passphrase::Passphrase,
-        private_copy::PrivateCopy,
-        texts::{self, ReadRecord},
-    },
-    verify::{Sought, check_key, lineage_of},
+    Result,
+    inputs::{passphrase::Passphrase, texts},
 };
 
 /// Combines key, record and flags. Without a record, flags that fit both versions of the mark ask for
 /// either.
-pub(super) fn requests(args: &VerifyArgs, suspect: &PrivateCopy) -> Result<Vec<Request>> {
+pub(super) fn requests(args: &VerifyArgs) -> Result<Vec<Request>> {
     let passphrase = Passphrase::of_child(args.opening.passphrase_file.as_deref());
-    let key = texts::key(&args.key, &passphrase, &mut warn)?;
+    let settings = Settings {
+        key: texts::key(&args.key, &passphrase, &mut warn)?,
+        registration: args.registration.into(),
+        demodulator: args.demodulator.into(),
+        radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
+        significance: args.significance,
+        sketch: args.report.is_some() || args.bundle.is_some(),
+        evidence_map: args.evidence_map.is_some(),
+        exact_displacements: args.exact_displacements,
+    };
     let record = args.record.as_deref().map(texts::record).transpose()?;
-    let flags = args.marking.0.iter().map(|(name, value)| (*name, value.as_str()));
-    let possible = match &record {
-        Some(ReadRecord { record, .. }) => {
-            Options::parse(flags)?;
-            check_flags(&args.marking.0, record)?;
-            check_key(record, &key)?;
-            vec![record.options()?]
-        }
-        None => possible_options(flags.collect(), args.demodulator.into())?,
-    };
-    let tried = possible.len();
-    let request = |options: Options| {
-        Ok(Request {
-            sought: sought(&options, &key, args.demodulator.into(), tried)?,
-            lineage: record.as_ref().map(|read| lineage_of(&read.record)).unwrap_or_default(),
-            tried,
-            subject: options.subject,
-            key: key.clone(),
-            reference: args.reference.first().expect("one is required").clone(),
-            suspect: suspect.clone(),
-            record: record.clone(),
-            parameters: options.parameters,
-            layers: options.layers,
-            srs: options.srs,
-            landmarks: args.landmark.clone(),
-            registration: args.registration.into(),
-            demodulator: args.demodulator.into(),
-            radius: args.radius.map_or(RadiusChoice::FromData, RadiusChoice::Given),
-            significance: args.significance,
-            sketch: args.report.is_some() || args.bundle.is_some(),
-            evidence_map: args.evidence_map.is_some(),
-            exact_displacements: args.exact_displacements,
-        })
-    };
-    possible.into_iter().map(request).collect()
-}
-
-/// Returns the options of the marks that flags may mean: CODE, CHIP_RATE, MESSAGE and the demodulator
-/// of the paper mean a message, and all others either a fingerprint or a message.
-fn possible_options(flags: Vec<(&str, &str)>, demodulator: Demodulator) -> Result<Vec<Options>> {
-    let given = Options::parse(flags.iter().copied())?;
-    let is_of_message = flags.iter().any(|(name, _)| ["CODE", "CHIP_RATE", "MESSAGE"].contains(name));
-    if is_of_message {
-        return Ok(vec![given]);
-    }
-    let code = given.parameters.code.name();
-    let message = Options::parse(flags.iter().copied().chain([("CODE", code.as_str())]))?;
-    if demodulator == Demodulator::Paper {
-        return Ok(vec![message]);
-    }
-    let fingerprint = match given.coefficients {
-        Some(_) => given,
-        None => Options::parse_for_recipients(flags)?,
-    };
-    Ok(vec![fingerprint, message])
-}
-
-/// Returns what the mark of these options carries.
-fn sought(options: &Options, key: &SecretKey, demodulator: Demodulator, tried: usize) -> Result<Sought> {
-    Ok(match options.coefficients {
-        Some(_) if demodulator == Demodulator::Paper => return Err(Error::PaperOfFingerprint),
-        Some(coefficients) => {
-            let recipient = options.subject.as_ref().and_then(Subject::recipient);
-            let recipients = recipient.map(String::from).into_iter().collect();
-            Sought::Fingerprint { coefficients, recipients, tried }
-        }
-        None => {
-            let bits = options.subject.as_ref().map(|subject| subject.message(key).len());
-            Sought::Message { bits: bits.unwrap_or(RECIPIENT_BITS) }
-        }
-    })
-}
-
-/// Checks that flags agree with the record, which they may repeat.
-fn check_flags(flags: &[(&'static str, String)], record: &Recorded) -> Result<()> {
-    let recorded = record.options()?;
-    for (name, value) in flags {
-        let alone = Options::parse([(*name, value.as_str())])?;
-        let on_record = match (*name, record) {
-            // A record of a message has that of its recipient, too.
-            ("MESSAGE", Recorded::Message(record)) => Some(record.message()?.to_hex()),
-            _ => recorded.text_of(name),
-        };
-        if alone.text_of(name) != on_record {
-            let flag = Spelling::Flag.value(name, value);
-            return Err(Error::Contradiction { flag });
-        }
-    }
-    Ok(())
+    let flags: Vec<_> = args.marking.0.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    Ok(verify::requests(&settings, &flags, record.as_ref())?)
 }

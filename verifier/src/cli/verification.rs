@@ -7,23 +7,22 @@ use super::{
     request::requests,
 };
 use meshmark_detection::decision::Verdict;
+use meshmark_verification::{
+    Error as Mismatch, Stages, html,
+    report::{self, Inputs, Provenance, Report},
+    verify::{Verification, verify, verify_records},
+};
 use meshmark_verifier::{
     Error, ExitCode, Result,
     bundle::{Bundle, Manifest, Role, Used},
     confinement::{self, End, Handover, Limits},
     deposit::Expected,
-    html,
     inputs::{
-        case_file,
-        digests::{Digests, Inputs},
-        gdal_failures,
-        private_copy::PrivateCopy,
+        case_file, digests::Digests, gdal_failures, map_files::MapFiles, private_copy::PrivateCopy, texts,
         versions::versions_and_program,
     },
     outputs::{EvidenceMapFile, Format, NewFile, ReportFile, write_evidence_map},
     progress::{Bar, Progress},
-    report::{self, Provenance, Report},
-    verify, verify_records,
 };
 use signal_hook::low_level::emulate_default_handler;
 use std::{fs, io, path::Path};
@@ -162,13 +161,27 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
     let digests = wanted.then(digest).transpose()?;
     let (json, explain, records) = (args.json, args.explain, args.records.clone());
     let show_recipients = args.show_recipients;
-    let requests = requests(&args, &suspect)?;
+    let requests = requests(&args)?;
     let files = args.deposit.as_deref().map(|path| deposit::files(path, &args.trust, None));
     let expected = files.map(|files| Expected::read(&files, &references)).transpose()?;
-    let mut progress = Progress::of_child();
-    let mut report = match &records {
-        Some(folder) => verify_records(&requests[0], &references, folder, &mut progress, &mut warn)?,
-        None => verify(&requests, &references, &mut progress)?,
+    let progress = Progress::of_child();
+    let show = |event| progress.show(event);
+    let mut stages = Stages::new(&show);
+    let landmarks = args.landmark.clone();
+    let mut maps = MapFiles { references: references.clone(), suspect: suspect.clone(), landmarks };
+    let Verification { mut report, crs } = match &records {
+        Some(folder) => {
+            let mut warn = |text: &str| warn(&folder.join(text).display().to_string());
+            let candidates = texts::named_records(folder)?;
+            let settings = &requests[0].settings;
+            verify_records(&mut maps, settings, candidates, &mut stages, &mut warn).map_err(|error| {
+                match error {
+                    Error::Verification(Mismatch::NoRecord) => Error::NoRecord { folder: folder.clone() },
+                    other => other,
+                }
+            })?
+        }
+        None => verify(&mut maps, &requests, &mut stages)?,
     };
     if let Some(expected) = expected {
         report.deposit = Some(expected.compare(&requests[0], args.record.as_deref(), &report)?);
@@ -179,13 +192,13 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
         report.hide_others();
     }
     if let Some(map) = report.evidence_map.take() {
-        write_evidence_map(&map, &Handover(folder).evidence_map())?;
+        write_evidence_map(&map, crs.as_ref(), &Handover(folder).evidence_map())?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
-    let code = report.exit_code();
+    let code = ExitCode::from(report.verdict);
     let mut answer = if json { report.to_json() } else { report.to_text() };
     let Some(digests) = digests else { return Ok(Examined { answer, reports: Vec::new(), code }) };
-    let inputs = digests.of_verification(&report.reference, best.as_deref())?;
+    let inputs = digests.of_verification(&references[report.reference], best.as_deref())?;
     if explain {
         answer += &format!("\n{}", report::explain(&inputs, &report));
     }

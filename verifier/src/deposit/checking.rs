@@ -4,11 +4,13 @@ use super::{Deposit, making::vertices};
 use crate::{
     Error, Result,
     inputs::{digests::files_digests, texts},
+};
+use meshmark_core::{counted, key::SecretKey};
+use meshmark_verification::{
     report::{Candidates, Standing},
     verify::check_key,
     words::printable,
 };
-use meshmark_core::{counted, key::SecretKey};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -175,7 +177,10 @@ fn check_records(
     for (path, read) in &records {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if let Some(key) = key {
-            let other = |source| Error::OfRecord { path: path.clone(), source: Box::new(source) };
+            let other = |source| Error::OfRecord {
+                path: path.clone(),
+                source: Box::new(Error::Verification(source)),
+            };
             check_key(&read.record, key).map_err(other)?;
         }
         comparison.check_record(&name, &read.sha256)?;

@@ -7,10 +7,9 @@ use crate::{
     inputs::{
         digests::files_digests,
         maps::{self, Reading},
-        texts::{self, ReadRecord},
+        texts,
         versions::versions,
     },
-    verify::{check_key, is_made_from},
 };
 use meshmark_core::{
     key::SecretKey,
@@ -18,6 +17,10 @@ use meshmark_core::{
     recorded::Recorded,
 };
 use meshmark_dataset::LabelFields;
+use meshmark_verification::{
+    Error as Mismatch,
+    verify::{ReadRecord, check_key, is_made_from},
+};
 use serde_json::{Value, json};
 use std::{
     collections::BTreeMap,
@@ -49,14 +52,14 @@ pub fn make(deposited: &Deposited, warn: &mut dyn FnMut(&str)) -> Result<Stateme
     }
     records.iter().try_for_each(|(path, read)| {
         check_key(&read.record, key)
-            .map_err(|source| Error::OfRecord { path: path.clone(), source: Box::new(source) })
+            .map_err(|source| Error::OfRecord { path: path.clone(), source: Box::new(source.into()) })
     })?;
     let vertices = vertices_of_all(references, &records)?;
     let of_none = |(_, read): &&(PathBuf, ReadRecord)| {
         !vertices.iter().any(|one| is_made_from(&read.record, &one.vertices_sha256))
     };
     if let Some((path, _)) = records.iter().find(of_none) {
-        let source = Box::new(Error::NoReferenceOfRecord { references: references.len() });
+        let source = Box::new(Mismatch::NoReferenceOfRecord { references: references.len() }.into());
         return Err(Error::OfRecord { path: path.clone(), source });
     }
     let recipient = |read: &ReadRecord| {

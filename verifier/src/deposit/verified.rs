@@ -1,10 +1,10 @@
 //! A verification and a deposit: what of all that the verification used is fixed.
 
 use super::{DepositFiles, Opened, checking::Comparison};
-use crate::{
-    Request, Result,
-    inputs::digests::files_digests,
+use crate::{Result, inputs::digests::files_digests};
+use meshmark_verification::{
     report::{DepositEntry, Report},
+    verify::Request,
 };
 use std::path::{Path, PathBuf};
 
@@ -36,11 +36,10 @@ impl Expected {
     pub fn compare(&self, request: &Request, record: Option<&Path>, report: &Report) -> Result<DepositEntry> {
         let Opened { deposit, is_signer_known, stamp } = &self.opened;
         let mut comparison = Comparison::new(deposit);
-        comparison.key(&request.key)?;
-        let own = self.references.iter().find(|(path, _)| *path == report.reference);
-        let (path, files) = own.expect("the verification has one of the references");
-        comparison.reference(path, &report.reference_digest, files)?;
-        for (path, files) in self.references.iter().filter(|(path, _)| *path != report.reference) {
+        comparison.key(&request.settings.key)?;
+        let (own, files) = &self.references[report.reference];
+        comparison.reference(own, &report.reference_digest, files)?;
+        for (path, files) in self.references.iter().filter(|(path, _)| path != own) {
             comparison.other_reference(path, files)?;
         }
         match (record.zip(request.record.as_ref()), &report.candidates) {
@@ -48,7 +47,7 @@ impl Expected {
             (None, Some(candidates)) => comparison.candidates(candidates)?,
             (None, None) => {
                 if let Some(recipient) = &report.parameters.recipient {
-                    comparison.recipient(&request.key, recipient)?;
+                    comparison.recipient(&request.settings.key, recipient)?;
                 }
                 comparison.not_fixed("how the map was marked, which the command line says");
             }

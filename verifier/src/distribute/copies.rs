@@ -11,8 +11,8 @@ use meshmark_core::{
     record::{Record, Reference},
     recorded::Recorded,
 };
-use meshmark_dataset::{Bases, Survey, formats::Format};
-use meshmark_marking::{self as marking, Lineage};
+use meshmark_dataset::{Survey, formats::Format};
+use meshmark_marking::{self as marking, Bases, Lineage};
 use sha2::{Digest, Sha256};
 use std::{
     fs,

@@ -31,9 +31,9 @@ use copies::MarkedCopy;
 use marks::Marks;
 use meshmark_core::options::Spelling;
 use meshmark_dataset::{
-    Bases, GeosOfGdal, Survey, file_digest, formats::Format, threads, workplace::Workplace,
+    GeosOfGdal, Survey, file_digest, formats::Format, read_bases, threads, workplace::Workplace,
 };
-use meshmark_marking::{self as marking, ThreadPool, Unmarked};
+use meshmark_marking::{self as marking, Bases, ThreadPool, Unmarked};
 use staging::Stage;
 use std::{
     fs,
@@ -58,7 +58,7 @@ pub struct Summary {
 /// warnings about legal but probably unintended input.
 pub fn distribute(
     request: &DistributeRequest,
-    progress: &mut Progress,
+    progress: &Progress,
     warn: &mut dyn FnMut(&str),
 ) -> Result<Summary> {
     let DistributeRequest { key, options, folder, .. } = request;
@@ -68,7 +68,7 @@ pub fn distribute(
     let done = Workplace::new(folder).map_err(Error::from).and_then(|workplace| {
         progress.start("reading", 0);
         let (dataset, map) = maps::source(&request.map, options, warn)?;
-        let bases = Bases::of_options(options, key, &map, &mut maps::base_reference)?;
+        let bases = read_bases(options, key, &map, &mut |path, entry| maps::base_reference(path, entry))?;
         let mut copies: Vec<MarkedCopy> =
             recipients.into_iter().map(|recipient| MarkedCopy::new(recipient, folder, format)).collect();
         let all = copies.len();
@@ -105,14 +105,13 @@ fn run(
     (survey, bases): (&Survey, &Bases),
     (format, stage): (&'static Format, &Stage),
     copies: &[MarkedCopy],
-    progress: &mut Progress,
+    progress: &Progress,
     warn: &mut dyn FnMut(&str),
 ) -> Result<()> {
     let DistributeRequest { key, options, folder, .. } = request;
-    let of_map = |error| maps::failed("map", &request.map, error);
-    let unsuited = |error: marking::Error| of_map(error.into());
+    let unsuited = |error: marking::Error| maps::failed("map", &request.map, error);
     let parameters = &options.parameters;
-    let map = survey.map(parameters).map_err(of_map)?;
+    let map = survey.map(parameters).map_err(unsuited)?;
     marking::check_extent(&map, parameters).map_err(unsuited)?;
     marking::check_scale(&map, survey.crs()).map_err(unsuited)?;
     let threads = threads();
@@ -137,9 +136,9 @@ fn run(
     let mut written = 0;
     for batch in copies.chunks(marks.batch()) {
         progress.start("solving patches", marks.patches() as u64);
-        let wanted = pool.install(|| marks.wanted(batch, &progress.stepper()))?;
+        let wanted = pool.install(|| marks.wanted(batch, &|steps| progress.step(steps)))?;
         progress.start("writing copies", batch.len() as u64);
-        let step = progress.stepper();
+        let step = |steps| progress.step(steps);
         let todo = Mutex::new(batch.iter().zip(wanted));
         let write_next = || {
             let next = todo.lock().expect("nobody panics with it").next();

@@ -8,6 +8,7 @@ use gdal::{
 };
 use meshmark_core::options::Spelling;
 use meshmark_dataset::{Error as MapError, Survey, formats::Format, parse_srs, traces, workplace::Workplace};
+use meshmark_marking::TransformableCrs;
 use std::path::Path;
 
 /// The base of all copies.

@@ -1,6 +1,7 @@
 //! The case file: what an examiner writes about a case, for the report.
 
-use crate::{Error, Result, inputs::texts, report::Case};
+use crate::{Error, Result, inputs::texts};
+use meshmark_verification::report::Case;
 use serde::Deserialize;
 use std::path::Path;
 

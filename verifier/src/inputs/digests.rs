@@ -1,40 +1,19 @@
 //! The files of a verification and their digests.
 
 use super::{belonging_files::files_of, private_copy::PrivateCopy};
-use crate::{Error, Result, words::printable};
+use crate::{Error, Result};
 use meshmark_core::hex;
 use meshmark_dataset::file_digest;
-use serde::Serialize;
+use meshmark_verification::{
+    report::{Digested, Inputs},
+    words::printable,
+};
 use sha2::{Digest, Sha256};
 use std::{
     fmt::Write as _,
     io,
     path::{Path, PathBuf},
 };
-
-/// The files, digested before GDAL reads them.
-#[derive(Debug, Clone, Serialize)]
-pub struct Inputs {
-    /// The key.
-    pub key: Digested,
-    /// The reference.
-    pub reference: Digested,
-    /// The other references that were given, such as those of earlier editions.
-    pub other_references: Vec<Digested>,
-    /// The suspect.
-    pub suspect: Digested,
-    /// The record, or the best one of many; null without.
-    pub record: Option<Digested>,
-}
-
-/// A file or folder and its digest.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Digested {
-    /// The path as given.
-    pub path: String,
-    /// "SHA-256 …", or the reason why there is none.
-    pub digest: String,
-}
 
 /// The digests of all files that a verification may use.
 pub struct Digests<'a> {

@@ -14,10 +14,11 @@ use meshmark_core::{
     options::{Options, Spelling},
 };
 use meshmark_dataset::{
-    CoordinateSystem, FeatureGeometry, LabelFields, MOST_VERTICES, OPEN_OPTIONS, Selection, Survey, features,
-    marked_view, survey,
+    CoordinateSystem, LabelFields, MOST_VERTICES, OPEN_OPTIONS, Selection, Survey, features, marked_view,
+    survey,
     traces::{self, ForeignMembers},
 };
+use meshmark_verification::compare::Compared;
 use std::{collections::BTreeSet, path::Path};
 
 /// The way to read a map.
@@ -110,7 +111,7 @@ pub fn geometries(
     what: &'static str,
     path: &Path,
     layers: Option<&[String]>,
-) -> Result<(Vec<FeatureGeometry>, Option<CoordinateSystem>)> {
+) -> Result<Compared<CoordinateSystem>> {
     let Opened { dataset, .. } = &open_untouched(what, path)?;
     forget_failure();
     let found = features(dataset, layers, &last_failure);
@@ -131,7 +132,7 @@ pub fn ground(path: &Path, layers: Option<&[String]>) -> Result<Ground> {
     survey.measure().cloned().map_err(|error| Error::Unmeasured {
         what: "reference",
         path: path.into(),
-        source: Box::new(error),
+        source: Box::new(error.into()),
     })
 }
 
@@ -200,6 +201,6 @@ pub(super) fn selection<'a>(reading: &Reading<'a>) -> Selection<'a> {
     }
 }
 
-pub(crate) fn failed(what: &'static str, path: &Path, source: meshmark_dataset::Error) -> Error {
-    Error::Map { what, path: path.into(), source: Box::new(source) }
+pub(crate) fn failed(what: &'static str, path: &Path, source: impl Into<meshmark_dataset::Error>) -> Error {
+    Error::Map { what, path: path.into(), source: Box::new(source.into()) }
 }

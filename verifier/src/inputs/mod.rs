@@ -6,6 +6,7 @@ pub mod case_file;
 pub mod digests;
 pub mod gdal_failures;
 mod journal;
+pub mod map_files;
 pub mod maps;
 pub mod passphrase;
 pub mod plain;

@@ -7,57 +7,28 @@ use super::{
     private_copy::PrivateCopy,
     suspect_formats, svg, tables,
 };
-use crate::{Cause, Error, Result, words::printable};
+use crate::{Cause, Error, Result};
 use gdal::{Dataset, vector::LayerAccess};
-use meshmark_dataset::{CoordinateSystem, LabelFields, Numbers, Survey, numbers};
-use meshmark_marking::{self as marking, Crs};
+use meshmark_dataset::{CoordinateSystem, LabelFields, numbers};
+use meshmark_marking::Crs;
+use meshmark_verification::{Suspect, words::printable};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
 };
 
-/// A suspect after reading.
-#[derive(Clone)]
-pub struct Suspect {
-    /// The map in the CRS of the reference, where both CRS are known and the coordinates are valid
-    /// in its own; otherwise the numbers of the file.
-    pub map: Survey,
-    /// The numbers of the file.
-    pub numbers: Numbers,
-    /// Whether `map` has these numbers.
-    pub is_raw: bool,
-    /// CRS of the layers.
-    pub layer_crs: Vec<String>,
-    /// The first CRS of a layer.
-    pub crs: Option<CoordinateSystem>,
-}
-
 /// A suspect is read whole, with all its attributes.
 const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
 
-/// Reads the suspect in the CRS of the reference, where both are known. Where reprojection fails,
-/// the coordinates stay unchanged.
-pub fn suspect(suspect: &PrivateCopy, reference: &Survey) -> Result<Suspect> {
+/// Reads the suspect.
+pub fn suspect(suspect: &PrivateCopy) -> Result<Suspect<CoordinateSystem>> {
     let _names = named_as(suspect.original(), suspect.copy());
     let dataset = open_suspect(suspect)?;
     let (layer_crs, crs) = (crs_of(&dataset), first_crs(&dataset));
-    let failed = |error| failed("suspect", suspect.original(), error);
     forget_failure();
-    let numbers = numbers(&dataset, &selection(&WHOLE)).map_err(failed)?;
-    if let (Some(target), Some(_)) = (&reference.crs, &crs) {
-        match numbers.in_crs(target) {
-            Ok(map) => return Ok(Suspect { map, numbers, is_raw: false, layer_crs, crs }),
-            // PROJ fails, or the map exceeds its limits, when the CRS is not that of the
-            // coordinates.
-            Err(
-                meshmark_dataset::Error::Reprojection { .. }
-                | meshmark_dataset::Error::FewPlaces { .. }
-                | meshmark_dataset::Error::Map(marking::Error::Core(_)),
-            ) => {}
-            Err(error) => return Err(failed(error)),
-        }
-    }
-    Ok(Suspect { map: numbers.clone().raw().map_err(failed)?, numbers, is_raw: true, layer_crs, crs })
+    let numbers = numbers(&dataset, &selection(&WHOLE));
+    let numbers = numbers.map_err(|error| failed("suspect", suspect.original(), error))?;
+    Ok(Suspect { numbers, layer_crs, crs })
 }
 
 fn open_suspect(suspect: &PrivateCopy) -> Result<Dataset> {

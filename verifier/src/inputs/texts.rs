@@ -2,14 +2,10 @@
 
 use super::{passphrase::Passphrase, plain};
 use crate::{Error, Result};
-use meshmark_core::{
-    hex,
-    key::{SecretKey, read_text},
-    recorded::Recorded,
-};
+use meshmark_core::key::{SecretKey, read_text};
 use meshmark_marking::exposure;
+use meshmark_verification::verify::{NamedRecord, ReadRecord};
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 use std::{
     io::{self, Read},
     path::{Path, PathBuf},
@@ -65,15 +61,6 @@ pub fn bytes(what: &'static str, path: &Path) -> Result<Vec<u8>> {
     read().map_err(|source| Error::TextUnread { what, path: path.into(), source })
 }
 
-/// A record, and the digest of the very bytes that it was read from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReadRecord {
-    /// The record.
-    pub record: Recorded,
-    /// SHA-256 of its file.
-    pub sha256: String,
-}
-
 /// Reads a record of either version.
 pub fn record(path: &Path) -> Result<ReadRecord> {
     parsed_record(path).map_err(|bad| of_record(path, bad))
@@ -88,21 +75,32 @@ fn of_record(path: &Path, bad: BadRecord) -> Error {
 
 /// The reason why a file is not a record.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum BadRecord {
+enum BadRecord {
     #[error("it cannot be read: {0}")]
     Unread(io::Error),
     #[error("{0}")]
     Malformed(meshmark_core::Error),
 }
 
+/// Reads what may be records in a folder (*.json), in the order of their names.
+///
+/// # Errors
+/// Fails when the folder cannot be read.
+pub fn named_records(folder: &Path) -> Result<Vec<NamedRecord>> {
+    let read = |path: PathBuf| NamedRecord {
+        name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        read: parsed_record(&path).map_err(|bad| bad.to_string()),
+    };
+    Ok(possible_records(folder)?.into_iter().map(read).collect())
+}
+
 /// Reads a record of many; the caller adds its name to errors.
-pub(crate) fn parsed_record(path: &Path) -> std::result::Result<ReadRecord, BadRecord> {
+fn parsed_record(path: &Path) -> std::result::Result<ReadRecord, BadRecord> {
     parsed(&text(path).map_err(BadRecord::Unread)?)
 }
 
 fn parsed(text: &str) -> std::result::Result<ReadRecord, BadRecord> {
-    let record = Recorded::from_json(text).map_err(BadRecord::Malformed)?;
-    Ok(ReadRecord { record, sha256: hex::encode(&Sha256::digest(text)) })
+    ReadRecord::parse(text).map_err(BadRecord::Malformed)
 }
 
 /// Returns the files of a folder that may be records (*.json), in the order of their names.

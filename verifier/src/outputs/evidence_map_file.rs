@@ -1,14 +1,12 @@
 //! The evidence map as a GeoPackage, which appears completely or not at all.
 
-use crate::{
-    Cause, Error, Result,
-    report::{EvidenceMap, ExactDisplacement, FoundVertex},
-};
+use crate::{Cause, Error, Result};
 use gdal::{
     Dataset, DriverManager,
     vector::{Feature, Geometry, Layer, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType},
 };
 use meshmark_dataset::{CoordinateSystem, workplace::folder_of};
+use meshmark_verification::report::{EvidenceMap, ExactDisplacement, FoundVertex};
 use std::{
     fs,
     io::ErrorKind,
@@ -71,36 +69,40 @@ fn workplace(path: &Path) -> Result<TempDir> {
 }
 
 /// Writes a layer with every matched vertex and the layer `patches`. The vertices are the points of
-/// `matched_vertices` or, with exact displacements, the lines of `vertex_displacements`.
+/// `matched_vertices` or, with exact displacements, the lines of `vertex_displacements`. `crs` is that of the
+/// reference.
 ///
 /// # Errors
 /// Fails when the file cannot be written.
-pub fn write_evidence_map(map: &EvidenceMap, path: &Path) -> Result<()> {
-    write_layers(map, path).map_err(|error| Error::unwritten(path.display(), error))
+pub fn write_evidence_map(map: &EvidenceMap, crs: Option<&CoordinateSystem>, path: &Path) -> Result<()> {
+    write_layers((map, crs), path).map_err(|error| Error::unwritten(path.display(), error))
 }
 
-fn write_layers(map: &EvidenceMap, path: &Path) -> gdal::errors::Result<()> {
+/// An evidence map and its CRS.
+type Located<'a> = (&'a EvidenceMap, Option<&'a CoordinateSystem>);
+
+fn write_layers((map, crs): Located, path: &Path) -> gdal::errors::Result<()> {
     gdal::config::set_thread_local_config_option("OGR_CURRENT_DATE", NO_TIME)?;
     let mut dataset = DriverManager::get_driver_by_name("GPKG")?.create_vector_only(path)?;
     match map.has_displacements {
-        true => write_displacements(map, &mut dataset)?,
-        false => write_vertices(map, &mut dataset)?,
+        true => write_displacements((map, crs), &mut dataset)?,
+        false => write_vertices((map, crs), &mut dataset)?,
     }
-    write_patches(map, &mut dataset)?;
+    write_patches((map, crs), &mut dataset)?;
     dataset.close()
 }
 
-fn write_vertices(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+fn write_vertices((map, crs): Located, dataset: &mut Dataset) -> gdal::errors::Result<()> {
     let fields = [("patch", OGRFieldType::OFTInteger), ("weight", OGRFieldType::OFTReal)];
     let (layer, rows) = (("matched_vertices", OGRwkbGeometryType::wkbPoint), map.vertices.iter());
-    write_layer(dataset, map.crs.as_ref(), layer, &fields, rows, |vertex, feature| {
+    write_layer(dataset, crs, layer, &fields, rows, |vertex, feature| {
         feature.set_field_integer(0, vertex.patch as i32)?;
         feature.set_field_double(1, vertex.weight)?;
         point(vertex.at)
     })
 }
 
-fn write_displacements(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+fn write_displacements((map, crs): Located, dataset: &mut Dataset) -> gdal::errors::Result<()> {
     use OGRFieldType::{OFTInteger, OFTReal};
     let fields = [
         ("patch", OFTInteger),
@@ -113,7 +115,7 @@ fn write_displacements(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors
     let (kind, rows) = (OGRwkbGeometryType::wkbLineString, map.vertices.iter().filter_map(displaced));
     write_layer(
         dataset,
-        map.crs.as_ref(),
+        crs,
         ("vertex_displacements", kind),
         &fields,
         rows,
@@ -129,7 +131,7 @@ fn write_displacements(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors
     )
 }
 
-fn write_patches(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Result<()> {
+fn write_patches((map, crs): Located, dataset: &mut Dataset) -> gdal::errors::Result<()> {
     use OGRFieldType::{OFTInteger, OFTReal, OFTString};
     let fields = [
         ("patch", OFTInteger),
@@ -139,7 +141,7 @@ fn write_patches(map: &EvidenceMap, dataset: &mut Dataset) -> gdal::errors::Resu
         ("recipient", OFTString),
     ];
     let (kind, rows) = (OGRwkbGeometryType::wkbPolygon, map.patches.iter().enumerate());
-    write_layer(dataset, map.crs.as_ref(), ("patches", kind), &fields, rows, |(number, patch), feature| {
+    write_layer(dataset, crs, ("patches", kind), &fields, rows, |(number, patch), feature| {
         for (field, value) in [number, patch.vertices.len(), patch.found].into_iter().enumerate() {
             feature.set_field_integer(field, value as i32)?;
         }

@@ -1,0 +1,135 @@
+//! The bases of a marking: the earlier editions from which vertices stand, with their references, and
+//! the anchors by which the map fits other sheets.
+
+use crate::{Crs, Error, Lineage, Result, Survey};
+use meshmark_core::{
+    anchors::Anchors,
+    fingerprint_record::{BaseEntry, PartEntry},
+    ground::Ground,
+    map::Map,
+    map_data::MapData,
+    options::Parameters,
+    series::{Census, Edition, Series},
+};
+
+/// Reads a reference as its entry describes it; returns nothing for a map without these layers.
+pub type ReadBase<'a, R, C, E> = dyn FnMut(&R, &BaseEntry) -> std::result::Result<Option<Survey<C>>, E> + 'a;
+
+/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors.
+#[derive(Default)]
+pub struct Bases {
+    anchors: Anchors,
+    entries: Vec<BaseEntry>,
+    references: Vec<BaseMap>,
+}
+
+/// The reference of a base.
+struct BaseMap {
+    data: MapData,
+    /// Metres on the ground at the place of a vertex, which fingerprints follow.
+    ground: Ground,
+}
+
+impl Bases {
+    /// Creates the bases of a map that has anchors alone.
+    pub fn of_anchors(anchors: Anchors) -> Self {
+        Bases { anchors, ..Bases::default() }
+    }
+
+    /// Finds the reference of every entry among these files, for a map with these anchors; `read`
+    /// returns nothing for a file that lacks the layers of the entry.
+    ///
+    /// # Errors
+    /// Fails on an entry without a reference, and on the errors of `read`.
+    pub fn find<R, C: Crs, E: From<Error>>(
+        (entries, anchors): (Vec<BaseEntry>, Anchors),
+        files: &[R],
+        read: &mut ReadBase<'_, R, C, E>,
+    ) -> std::result::Result<Self, E> {
+        let mut found: Vec<Option<Survey<C>>> = entries.iter().map(|_| None).collect();
+        let alike = |a: &BaseEntry, b: &BaseEntry| a.layers == b.layers && a.srs == b.srs;
+        for file in files {
+            for (number, entry) in entries.iter().enumerate() {
+                // Entries that describe their maps alike read the file alike.
+                let lack = |(survey, other): (&Option<Survey<C>>, &BaseEntry)| {
+                    survey.is_none() && alike(other, entry)
+                };
+                let is_first = !entries[..number].iter().any(|other| alike(other, entry));
+                if !is_first || !found.iter().zip(&entries).any(lack) {
+                    continue;
+                }
+                let Some(survey) = read(file, entry)? else { continue };
+                let digest = survey.data.vertices.digest();
+                let own = |other: &BaseEntry| other.vertices_sha256 == digest && alike(other, entry);
+                if let Some(place) = entries.iter().position(own) {
+                    found[place].get_or_insert(survey);
+                }
+            }
+        }
+        let lost = found.iter().zip(&entries).find(|(survey, _)| survey.is_none());
+        if let Some((_, entry)) = lost {
+            return Err(Error::LostBase { vertices_sha256: entry.vertices_sha256.clone() }.into());
+        }
+        let of_survey = |survey: Survey<C>| {
+            let ground = survey.measure()?.clone();
+            Ok::<BaseMap, Error>(BaseMap { data: survey.data, ground })
+        };
+        let references = found.into_iter().flatten().map(of_survey).collect::<Result<_>>()?;
+        Ok(Bases { anchors, entries, references })
+    }
+
+    /// Returns whether a vertex of the map is in the reference of a base.
+    pub fn have_any_of<C>(&self, map: &Survey<C>) -> bool {
+        let is_there = |point: &[f64; 2]| {
+            self.references.iter().any(|base| base.data.vertices.index_of(*point).is_some())
+        };
+        map.data.vertices.coords().iter().any(is_there)
+    }
+
+    /// Returns whether there are neither bases nor anchors, so that the map is one part.
+    pub fn are_none(&self) -> bool {
+        self.entries.is_empty() && self.anchors.is_empty()
+    }
+
+    /// Returns what a record says about the bases, the anchors, and the parts that follow from them.
+    pub fn lineage(&self, parts: Vec<PartEntry>, census: Option<Census>) -> Lineage {
+        Lineage { parts, bases: self.entries.clone(), anchors: self.anchors.clone(), census }
+    }
+
+    /// Returns the series of the bases and a map that rests on them.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Series::new`].
+    pub fn series<'a>(
+        &'a self,
+        map: Map<'a>,
+        parameters: &'a Parameters,
+    ) -> meshmark_core::Result<Series<'a>> {
+        let number = |digest: &String| {
+            self.entries.iter().position(|entry| entry.vertices_sha256 == *digest).expect("it was checked")
+        };
+        let edition = |(entry, BaseMap { data, ground }): (&'a BaseEntry, &'a BaseMap)| Edition {
+            map: data.on(ground, ground),
+            bases: entry.bases.iter().map(number).collect(),
+            anchors: entry.anchors.as_slice(),
+        };
+        let mut editions: Vec<Edition> = self.entries.iter().zip(&self.references).map(edition).collect();
+        editions.push(Edition {
+            map,
+            bases: (0..self.entries.len()).collect(),
+            anchors: self.anchors.as_slice(),
+        });
+        Series::new(editions, parameters)
+    }
+
+    /// Returns a map with the vertices of its bases besides its own.
+    ///
+    /// # Errors
+    /// Fails where the maps span too much.
+    pub fn united<C: Clone>(&self, map: &Survey<C>) -> Result<Survey<C>> {
+        let earlier: Vec<&MapData> = self.references.iter().map(|base| &base.data).collect();
+        let mut united = map.clone();
+        united.data = map.data.with_earlier(&earlier)?;
+        Ok(united)
+    }
+}
