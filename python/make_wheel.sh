@@ -20,6 +20,9 @@ if ldd "$out"/clean/lib/python*/site-packages/meshmark/_meshmark*.so | grep -E '
 fi
 cd python
 "../$out/clean/bin/python" -m unittest discover -s tests
-"../$out/clean/bin/python" -c 'import doctest, meshmark, sys; sys.exit(doctest.testmod(meshmark).failed > 0)'
+"../$out/clean/bin/python" -c 'import doctest, sys, meshmark
+from meshmark import _comparison, _distribution, _verification
+modules = (meshmark, _comparison, _distribution, _verification)
+sys.exit(any(doctest.testmod(module).failed for module in modules))'
 cd ..
 ls -l "$out"/wheels

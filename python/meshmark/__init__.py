@@ -1,4 +1,4 @@
-"""Watermarks for vector maps: mark GeoDataFrames for a recipient.
+"""Watermarks for vector maps: mark GeoDataFrames for a recipient, and verify whose copy one is.
 
     >>> import geopandas, shapely
     >>> houses = [shapely.box(20 * x, 20 * y, 20 * x + 9 + (x * y) % 5, 20 * y + 8) for x in range(20) for y in range(20)]
@@ -9,12 +9,17 @@
     'ACME GmbH'
     >>> bool(copy.distance(town).max() < 0.75)
     True
+    >>> verify(copy, town, key, record).verdict
+    'match'
 
-The command ``meshmark verify`` recognises the copy with the key, the unmarked map and the record.
+The command ``meshmark verify`` recognises the copy as well.
 """
 
+from ._comparison import compare
+from ._distribution import distribute
 from ._marking import mark
 from ._meshmark import (
+    Comparison,
     Key,
     KeyFileError,
     MapError,
@@ -22,10 +27,13 @@ from ._meshmark import (
     OptionError,
     Record,
     RecordError,
+    Report,
     __version__,
 )
+from ._verification import verify
 
 __all__ = [
+    "Comparison",
     "Key",
     "KeyFileError",
     "MapError",
@@ -33,5 +41,9 @@ __all__ = [
     "OptionError",
     "Record",
     "RecordError",
+    "Report",
+    "compare",
+    "distribute",
     "mark",
+    "verify",
 ]

@@ -6,6 +6,7 @@ import numpy
 import pyarrow
 import shapely
 
+from ._attributes import values_of
 from ._layers import Column
 
 # The names of the extension type for well-known binary.
@@ -69,6 +70,11 @@ class Table:
         if not _is_binary(values.type):
             raise TypeError(f"column {column!r} is {values.type}, and not well-known binary")
         return values.to_pylist()
+
+    def attributes(self):
+        """Return names and values of the other columns."""
+        others = [name for name in self.table.column_names if name not in self.names]
+        return {name: values_of(self.table.column(name).to_pylist()) for name in others}
 
     def moved(self, geometries):
         """Return a table with these geometries, those of each column, and with their bounding boxes."""

@@ -22,7 +22,19 @@ class Crs:
         self.ellipsoid_m = (
             [ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre] if ellipsoid else None
         )
-        self._transformer = None
+        self._transformers = {}
+
+    @property
+    def geographic(self):
+        """The CRS of longitudes and latitudes on its datum; None without one."""
+        geodetic = self.crs.geodetic_crs
+        return Crs(geodetic) if geodetic is not None else None
+
+    @property
+    def prime_meridian_degrees(self):
+        """Degrees from Greenwich to the prime meridian."""
+        meridian = self.crs.prime_meridian
+        return math.degrees(meridian.longitude * meridian.unit_conversion_factor) if meridian else 0.0
 
     def is_same(self, other):
         """Return whether two have the same x and y."""
@@ -32,10 +44,26 @@ class Crs:
         """Return longitudes and latitudes on the datum of the CRS; inf where there is no place."""
         if self.label == "EPSG:3857":
             return _of_web_mercator(x, y)
-        if self._transformer is None:
-            geodetic = self.crs.geodetic_crs
-            self._transformer = pyproj.Transformer.from_crs(self.crs, geodetic, always_xy=True)
-        return self._transformer.transform(x, y)
+        return self._transformed(x, y, self.crs.geodetic_crs)
+
+    def transform(self, x, y, target):
+        """Return eastings and northings, or longitudes and latitudes, in another CRS; inf where there is no place."""
+        if self.label == "EPSG:3857" and target.label in ("EPSG:4326", "OGC:CRS84"):
+            return _of_web_mercator(x, y)
+        return self._transformed(x, y, target.crs)
+
+    def _transformed(self, x, y, target):
+        if target not in self._transformers:
+            self._transformers[target] = pyproj.Transformer.from_crs(self.crs, target, always_xy=True)
+        return self._transformers[target].transform(x, y)
+
+
+def parse(text):
+    """Return the CRS of a text such as "EPSG:3067"; None for one that PROJ does not know."""
+    try:
+        return Crs(text)
+    except pyproj.exceptions.CRSError:
+        return None
 
 
 def _kind(crs):

@@ -3,11 +3,15 @@
 import numpy
 import shapely
 
+from ._attributes import texts_of, values_of
 from ._crs import Crs
 
 
 class Column:
     """A geometry column of a layer, as the extension takes it."""
+
+    # Texts and integers of each feature, by which a verification finds places; of the first column of a layer.
+    attributes = None
 
     def __init__(self, layer, geometries, crs, index=None):
         self.name = layer
@@ -36,6 +40,12 @@ class Frame:
             Column(name, wkb_of(frame[column].to_numpy()), frame[column].crs, frame.index) for column in self.names
         ]
 
+    def attributes(self):
+        """Return names and values of the other columns."""
+        others = [number for number, name in enumerate(self.frame.columns) if name not in self.names]
+        columns = {str(self.frame.columns[number]): self.frame.iloc[:, number] for number in others}
+        return {name: values_of(column.to_numpy(dtype=object, na_value=None)) for name, column in columns.items()}
+
     def moved(self, geometries):
         """Return a copy with these geometries, those of each column."""
         copy = self.frame.copy()
@@ -52,6 +62,10 @@ class Series:
         self.series = series
         self.columns = [Column(name, wkb_of(series.to_numpy()), series.crs, series.index)]
 
+    def attributes(self):
+        """Return nothing: a series has no other columns."""
+        return {}
+
     def moved(self, geometries):
         """Return a copy with these geometries."""
         series = self.series
@@ -66,6 +80,10 @@ class Array:
         self.shape = array.shape
         self.columns = [Column(name, wkb_of(array.ravel()), None)]
 
+    def attributes(self):
+        """Return nothing: an array has no other columns."""
+        return {}
+
     def moved(self, geometries):
         """Return an array of the same shape with these geometries."""
         moved = numpy.empty(len(geometries[0]), dtype=object)
@@ -76,6 +94,39 @@ class Array:
 def wkb_of(array):
     """Return geometries as well-known binary, heights and measures included."""
     return shapely.to_wkb(array, output_dimension=4, byte_order=1, flavor="iso").tolist()
+
+
+class Sources:
+    """The layers of a map, whichever kind they have."""
+
+    def __init__(self, layers, geometry):
+        self.is_named = isinstance(layers, dict)
+        given = layers if self.is_named else {"layer": layers}
+        self.layers = {name: source(name, layer, geometry) for name, layer in given.items()}
+
+    @property
+    def columns(self):
+        """The geometry columns of all layers."""
+        return [column for layer in self.layers.values() for column in layer.columns]
+
+    def moved(self, geometries):
+        """Return copies of the layers with these geometries, those of each column."""
+        moved = iter(geometries)
+        copies = {name: layer.moved([next(moved) for _ in layer.columns]) for name, layer in self.layers.items()}
+        return copies if self.is_named else copies["layer"]
+
+
+class Map:
+    """A map that is verified, as the extension takes it; the fields of these names become attributes, or all."""
+
+    def __init__(self, layers, geometry, fields=None):
+        sources = Sources(layers, geometry)
+        self.is_named, self.layers = sources.is_named, sources.columns
+        self.fields = set()
+        for layer in sources.layers.values():
+            columns = layer.attributes()
+            self.fields.update(columns)
+            layer.columns[0].attributes = texts_of(columns, len(layer.columns[0].geometries), fields)
 
 
 def source(name, layer, geometry):

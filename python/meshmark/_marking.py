@@ -4,23 +4,9 @@ import warnings
 from collections.abc import Callable
 from typing import Any, Optional
 
-import pyproj
-
 from . import _geos, _meshmark
-from ._crs import Crs
-from ._layers import source
-
-# The options of the driver that shape a mark.
-OPTIONS = (
-    "amplitude",
-    "basis",
-    "chip_rate",
-    "code",
-    "patch_size",
-    "precision",
-    "shape",
-    "tolerance",
-)
+from ._layers import Sources
+from ._options import check_options, check_threads, option_pairs
 
 
 def mark(
@@ -75,33 +61,15 @@ def mark(
     OptionError
         When an option has a value that is not legal.
     """
-    unknown = sorted(set(options) - set(OPTIONS))
-    if unknown:
-        raise TypeError(f"mark() has no option {unknown[0]}: use {', '.join(OPTIONS)}")
+    check_options("mark", options)
     if (recipient is None) == (message is None):
         raise TypeError("mark() needs a recipient or a message, and not both")
-    for name, text in (("recipient", recipient), ("message", message), ("srs", srs)):
-        if text is not None and not isinstance(text, str):
-            raise TypeError(f"{name} is {text!r}, a {type(text).__name__}, and not a text")
-    if threads is not None and not 1 <= threads <= 256:
-        raise ValueError(f"threads={threads} is not a whole number from 1 to 256")
-    texts = {"recipient": recipient, "message": message, "srs": srs, **options}
-    pairs = [(name.upper(), str(value)) for name, value in texts.items() if value is not None]
-    given = layers if isinstance(layers, dict) else {"layer": layers}
-    sources = {name: source(name, layer, geometry) for name, layer in given.items()}
-    columns = [column for layer in sources.values() for column in layer.columns]
-    settings = {"srs": srs and _crs_of(srs), "threads": threads, "progress": progress}
-    moved, record, texts = _meshmark.mark(columns, key, pairs, _geos, settings)
+    check_threads(threads)
+    pairs = option_pairs({"srs": srs}, options)
+    subject = option_pairs({"recipient": recipient, "message": message}, {})
+    map = Sources(layers, geometry)
+    settings = {"threads": threads, "progress": progress}
+    [(moved, record)], texts = _meshmark.mark(map.columns, key, pairs, subject, _geos, settings)
     for text in texts:
         warnings.warn(text, stacklevel=2)
-    moved = iter(moved)
-    copies = {name: layer.moved([next(moved) for _ in layer.columns]) for name, layer in sources.items()}
-    return (copies if isinstance(layers, dict) else copies["layer"]), record
-
-
-def _crs_of(srs):
-    try:
-        return Crs(srs)
-    except pyproj.exceptions.CRSError:
-        text = f"srs={srs} is not a CRS that PROJ knows: use for example EPSG:3067"
-        raise _meshmark.OptionError(text) from None
+    return map.moved(moved), record

@@ -1,16 +1,21 @@
-//! Layers as the Python package hands them over.
+//! Layers as the Python package hands them over, and the map that they are.
 
 use crate::crs::PyCrs;
-use meshmark_core::map_data::MapData;
-use meshmark_marking::{self as marking, Chains, Crs, Extent, Faults, Geometries, Metric, Moves, NotMoved};
+use meshmark_marking::{
+    self as marking, Chains, Content, Crs, Extent, Faults, Moves, NotMoved, Numbers, Outline, Survey,
+    TransformableCrs,
+};
 use pyo3::{prelude::*, pybacked::PyBackedBytes};
 
 /// A geometry column of a layer; the package's class `_layers.Column`.
 pub struct Layer {
     object: Py<PyAny>,
-    name: String,
+    /// The name of the layer.
+    pub name: String,
     /// The geometries, well-known binary; `None` for a missing one.
     geometries: Vec<Option<PyBackedBytes>>,
+    /// Texts and integers of each feature, of the first geometry column of a layer.
+    attributes: Option<Vec<Vec<String>>>,
     crs: Option<PyCrs>,
 }
 
@@ -21,6 +26,7 @@ impl<'py> FromPyObject<'_, 'py> for Layer {
         Ok(Layer {
             name: object.getattr("name")?.extract()?,
             geometries: object.getattr("geometries")?.extract()?,
+            attributes: object.getattr("attributes")?.extract()?,
             crs: object.getattr("crs")?.extract()?,
             object: object.to_owned().unbind(),
         })
@@ -29,13 +35,19 @@ impl<'py> FromPyObject<'_, 'py> for Layer {
 
 impl Layer {
     /// Returns the name of a feature for messages: its index in the frame.
-    fn fid(&self, number: usize) -> String {
+    pub fn fid(&self, number: usize) -> String {
         let fid = Python::attach(|py| self.object.bind(py).call_method1("fid", (number,))?.extract());
         fid.unwrap_or_else(|_| number.to_string())
     }
 
-    fn crs(&self) -> Option<&dyn Crs> {
-        as_crs(self.crs.as_ref())
+    /// Returns its own CRS.
+    pub fn crs(&self) -> Option<&PyCrs> {
+        self.crs.as_ref()
+    }
+
+    /// Returns its geometries that are there, with their numbers.
+    pub fn geometries(&self) -> impl Iterator<Item = (usize, &PyBackedBytes)> {
+        self.geometries.iter().enumerate().filter_map(|(number, wkb)| Some((number, wkb.as_ref()?)))
     }
 
     /// Returns its geometries with moved vertices.
@@ -53,91 +65,101 @@ impl Layer {
         };
         self.geometries.iter().enumerate().map(moved).collect()
     }
-}
 
-/// The map of all layers.
-pub struct LayeredMap<'a> {
-    pub data: MapData,
-    pub geometries: Geometries,
-    pub metric: Metric,
-    crs: Option<&'a PyCrs>,
-}
-
-impl<'a> LayeredMap<'a> {
-    pub fn crs(&self) -> Option<&dyn Crs> {
-        as_crs(self.crs)
-    }
-
-    /// Reads layers, which share one CRS.
-    pub fn read(py: Python, layers: &'a [Layer]) -> PyResult<Result<Self, marking::Error>> {
-        if let Some(mixed) = mixed_crs(py, layers)? {
-            return Ok(Err(mixed));
+    /// Adds its attributes with the places of the features, and the rings and lines of these.
+    fn describe(&self, content: &mut Content<PyCrs>) {
+        let Some(attributes) = &self.attributes else { return };
+        for (number, wkb) in self.geometries() {
+            // What cannot be read is left out, or was refused before.
+            let Ok(outline) = Outline::of_wkb(wkb.to_vec()) else { continue };
+            if !outline.chains.is_empty() {
+                content.describe(attributes[number].clone(), &outline.to_collection());
+            }
         }
-        Ok(Self::of_one_crs(layers))
     }
+}
 
-    fn of_one_crs(layers: &'a [Layer]) -> marking::Result<Self> {
-        let crs = layers.iter().find(|layer| layer.has_any()).and_then(|layer| layer.crs.as_ref());
+/// What of a map is read besides its vertices.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Besides {
+    /// Its vertices alone.
+    Nothing,
+    /// The geometries, which a marking moves.
+    Geometries,
+    /// Attributes, rings, lines and areas, by which a verification finds places.
+    Description,
+}
+
+/// Reads layers, which share one CRS: their own, or this one where they have none.
+///
+/// # Errors
+/// Fails on layers of several CRS, and on geometries that are malformed or not finite.
+pub fn survey(layers: &[&Layer], given: Option<&PyCrs>, besides: Besides) -> marking::Result<Survey<PyCrs>> {
+    let of_layer = layers.iter().map(|layer| crs_of(layer, given));
+    let of_layer = of_layer.collect::<marking::Result<Vec<_>>>()?;
+    let crs = common_crs(layers, &of_layer)?;
+    let mut content = Content::new(besides == Besides::Description);
+    for (layer, own) in layers.iter().zip(of_layer) {
+        let extent = Extent::in_crs(own.as_ref().map(|crs| crs as &dyn Crs));
         let mut chains = Chains::default();
-        for layer in layers {
-            for (number, wkb) in layer.geometries.iter().enumerate() {
-                let Some(wkb) = wkb else { continue };
-                let fid = || layer.fid(number);
-                let how = (true, Extent::in_crs(layer.crs()));
-                chains.read(wkb.to_vec(), (&layer.name, &fid), how, Faults::Fail)?;
-            }
+        for (number, wkb) in layer.geometries() {
+            let fid = || layer.fid(number);
+            let how = (besides == Besides::Geometries, extent);
+            chains.read(wkb.to_vec(), (&layer.name, &fid), how, Faults::Fail)?;
         }
-        let coords = std::mem::take(&mut chains.coords);
-        let (data, indices) = MapData::from_chains(coords, &chains.starts, chains.chain_kinds())?;
-        let metric = Metric::measure(as_crs(crs), &data.vertices)?;
-        Ok(LayeredMap { data, geometries: Geometries::new(indices, chains), metric, crs })
-    }
-}
-
-fn as_crs(crs: Option<&PyCrs>) -> Option<&dyn Crs> {
-    crs.map(|crs| crs as &dyn Crs)
-}
-
-impl Layer {
-    fn has_any(&self) -> bool {
-        self.geometries.iter().any(Option::is_some)
-    }
-}
-
-/// Gives layers without a CRS that of the option `srs`.
-pub fn assign_crs(py: Python, layers: &mut [Layer], srs: &Bound<PyAny>) -> PyResult<marking::Result<()>> {
-    for layer in layers {
-        let given: PyCrs = srs.extract()?;
-        match &layer.crs {
-            Some(own) if !own.is_same(py, &given)? => {
-                let (crs, srs) = (own.brief_name(), given.brief_name());
-                return Ok(Err(marking::Error::ContradictingSrs { crs, srs }));
-            }
-            Some(_) => {}
-            None => layer.crs = Some(given),
+        if besides == Besides::Description {
+            layer.describe(&mut content);
         }
+        content.end_layer(&layer.name, [(own, chains)]);
     }
-    Ok(Ok(()))
+    content.survey(crs, besides == Besides::Geometries)
 }
 
-/// Returns the error of layers with geometries whose CRS differ, as one mesh needs one.
-fn mixed_crs(py: Python, layers: &[Layer]) -> PyResult<Option<marking::Error>> {
-    let mut layers = layers.iter().filter(|layer| layer.has_any());
-    let Some(first) = layers.next() else { return Ok(None) };
+/// Reads layers in any CRS, without what nobody can place.
+pub fn numbers(layers: &[Layer]) -> marking::Result<Numbers<PyCrs>> {
+    let mut content = Content::new(true);
     for layer in layers {
-        let is_same = match (&first.crs, &layer.crs) {
-            (Some(a), Some(b)) => a.is_same(py, b)?,
+        let mut chains = Chains::default();
+        for (number, wkb) in layer.geometries() {
+            let fid = || layer.fid(number);
+            let faults = Faults::LeaveOut(&mut content.left_out);
+            chains.read(wkb.to_vec(), (&layer.name, &fid), (false, Extent::ANY), faults)?;
+        }
+        layer.describe(&mut content);
+        content.end_layer(&layer.name, [(layer.crs.clone(), chains)]);
+    }
+    Ok(content.into_numbers())
+}
+
+/// Returns the CRS of a layer, which is the given one where it has none of its own.
+fn crs_of(layer: &Layer, given: Option<&PyCrs>) -> marking::Result<Option<PyCrs>> {
+    match (&layer.crs, given) {
+        (Some(own), Some(given)) if !own.is_same(given) => {
+            let [crs, srs] = own.names_apart(given);
+            Err(marking::Error::ContradictingSrs { crs, srs })
+        }
+        (own, given) => Ok(own.as_ref().or(given).cloned()),
+    }
+}
+
+/// Returns the CRS of layers with geometries, as one mesh needs one.
+fn common_crs(layers: &[&Layer], crs: &[Option<PyCrs>]) -> marking::Result<Option<PyCrs>> {
+    let mut filled = layers.iter().zip(crs).filter(|(layer, _)| layer.geometries().next().is_some());
+    let Some((first, first_crs)) = filled.next() else { return Ok(None) };
+    for (layer, other) in filled {
+        let is_same = match (first_crs, other) {
+            (Some(a), Some(b)) => a.is_same(b),
             (a, b) => a.is_none() && b.is_none(),
         };
         if !is_same {
-            let name = |layer: &Layer| layer.crs().map_or("no CRS".into(), |crs| crs.brief_name());
-            return Ok(Some(marking::Error::MixedCrs {
+            let name = |crs: &Option<PyCrs>| crs.as_ref().map_or("no CRS".into(), Crs::brief_name);
+            return Err(marking::Error::MixedCrs {
                 first: first.name.clone(),
-                first_crs: name(first),
+                first_crs: name(first_crs),
                 second: layer.name.clone(),
-                second_crs: name(layer),
-            }));
+                second_crs: name(other),
+            });
         }
     }
-    Ok(None)
+    Ok(first_crs.clone())
 }

@@ -1,15 +1,20 @@
 //! The module `meshmark._meshmark`, on which the Python package `meshmark` rests: layers as lists of
-//! well-known binary in, marked layers and a record out. The package brings the CRS of pyproj and the
+//! well-known binary in, marked layers and a record out, or a report. The package brings the CRS of pyproj and the
 //! GEOS of shapely.
 #![deny(unsafe_code)]
 
+mod comparison;
 mod crs;
 mod errors;
 mod geos;
 mod key;
 mod layer;
+mod layered_maps;
 mod marking;
+mod notebook;
 mod record;
+mod report;
+mod verification;
 mod waiting;
 
 use pyo3::prelude::*;
@@ -20,5 +25,9 @@ fn _meshmark(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<key::Key>()?;
     module.add_class::<record::Record>()?;
-    module.add_function(wrap_pyfunction!(marking::mark, module)?)
+    module.add_class::<report::Report>()?;
+    module.add_class::<comparison::Comparison>()?;
+    module.add_function(wrap_pyfunction!(marking::mark, module)?)?;
+    module.add_function(wrap_pyfunction!(verification::verify, module)?)?;
+    module.add_function(wrap_pyfunction!(comparison::compare, module)?)
 }

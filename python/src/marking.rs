@@ -1,10 +1,11 @@
 //! Marking: layers and options → map → core → moved layers and a record.
 
 use crate::{
+    crs::PyCrs,
     errors::{of_map, of_options},
     geos::PyGeos,
     key::Key,
-    layer::{Layer, LayeredMap, assign_crs},
+    layer::{Besides, Layer, survey},
     record::Record,
     waiting::{Job, run},
 };
@@ -17,100 +18,123 @@ use meshmark_core::{
     options::{Options, Spelling, Subject},
     series::Series,
 };
-use meshmark_marking::{self as marking, Lineage, Moves, ThreadPool, Unmarked, damage_warning};
-use pyo3::{exceptions::PyOSError, prelude::*, types::PyBytes};
-use std::thread::available_parallelism;
+use meshmark_marking::{self as marking, Lineage, Moves, Survey, Unmarked, damage_warning};
+use pyo3::{prelude::*, types::PyBytes};
 
-/// A marked map: the geometries of each layer, the record, and warnings.
-type MarkedLayers = (Vec<Vec<Option<Vec<u8>>>>, Record, Vec<String>);
+/// The geometries of each layer, well-known binary.
+type Geometries<T> = Vec<Vec<Option<T>>>;
 
-/// Marked layers for Python.
-type PyMarkedLayers<'py> = (Vec<Vec<Option<Bound<'py, PyBytes>>>>, Record, Vec<String>);
+/// Marked copies with their records, and warnings.
+struct Copies {
+    copies: Vec<(Geometries<Vec<u8>>, Record)>,
+    warnings: Vec<String>,
+}
+
+/// Marked copies for Python.
+type PyCopies<'py> = (Vec<(Geometries<Bound<'py, PyBytes>>, Record)>, Vec<String>);
 
 /// What does not shape the mark, a dict.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Settings<'py> {
-    /// The CRS of layers without one.
-    srs: Option<Bound<'py, PyAny>>,
     threads: Option<usize>,
     progress: Option<Bound<'py, PyAny>>,
 }
 
-/// Mark layers with the options NAME, value; `geos` is the package's module `_geos`.
+/// Mark layers for every one of these subjects, each a recipient or a message, with the options NAME,
+/// value; `geos` is the package's module `_geos`. Warnings are those about the first copy.
 #[pyfunction]
 pub fn mark<'py>(
     py: Python<'py>,
-    mut layers: Vec<Layer>,
+    layers: Vec<Layer>,
     key: &Key,
     options: Vec<(String, String)>,
+    subjects: Vec<(String, String)>,
     geos: Py<PyModule>,
     settings: Settings<'py>,
-) -> PyResult<PyMarkedLayers<'py>> {
-    let Settings { srs, threads, progress } = settings;
-    let pairs = options.iter().map(|(name, value)| (name.as_str(), value.as_str()));
-    let options = Options::parse(pairs).map_err(of_options)?;
-    if let Some(srs) = srs {
-        assign_crs(py, &mut layers, &srs)?.map_err(of_map)?;
-    }
-    let map = LayeredMap::read(py, &layers)?.map_err(of_map)?;
-    let threads = threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+) -> PyResult<PyCopies<'py>> {
+    let Settings { threads, progress } = settings;
+    let parse = |subject: &(String, String)| {
+        let pairs = options.iter().chain([subject]).map(|(name, value)| (name.as_str(), value.as_str()));
+        Options::parse(pairs).map_err(of_options)
+    };
+    let options = subjects.iter().map(parse).collect::<PyResult<Vec<Options>>>()?;
+    let Some(first) = options.first() else { return Ok((Vec::new(), Vec::new())) };
+    let srs = first.srs.as_deref().map(PyCrs::parse).transpose().map_err(of_map)?;
+    let all: Vec<&Layer> = layers.iter().collect();
+    let map = survey(&all, srs.as_ref(), Besides::Geometries).map_err(of_map)?;
     let (layers, geos) = (&layers[..], &PyGeos(geos));
-    let (moved, record, warnings) = run(py, progress.as_ref(), |job| {
-        let pool = ThreadPool::new(threads, || (), || ());
-        let pool =
-            pool.map_err(|error| PyOSError::new_err(format!("the system gives no threads: {error}")))?;
-        pool.install(|| marked(layers, &map, (&key.0, &options), geos, job)).map_err(of_map)
+    let Copies { copies, warnings } = run(py, progress.as_ref(), threads, |job| {
+        marked(layers, &map, (&key.0, &options), geos, job).map_err(of_map)
     })?;
     let bytes = |wkb: Option<Vec<u8>>| wkb.map(|wkb| PyBytes::new(py, &wkb));
-    let moved = moved.into_iter().map(|layer| layer.into_iter().map(bytes).collect()).collect();
-    Ok((moved, record, warnings))
+    let of_layers = |layers: Geometries<Vec<u8>>| {
+        layers.into_iter().map(|layer| layer.into_iter().map(bytes).collect()).collect()
+    };
+    Ok((copies.into_iter().map(|(layers, record)| (of_layers(layers), record)).collect(), warnings))
 }
 
+/// Marks a map with each of these options, which differ in their subjects alone.
 fn marked(
     layers: &[Layer],
-    map: &LayeredMap,
-    (key, options): (&SecretKey, &Options),
+    map: &Survey<PyCrs>,
+    (key, options): (&SecretKey, &[Options]),
     geos: &PyGeos,
     job: &Job,
-) -> marking::Result<MarkedLayers> {
-    let (parameters, spelling) = (&options.parameters, Spelling::Keyword);
-    let subject = options.subject.as_ref().expect("the package asks for it");
-    let on_ground = map.metric.map(&map.data, parameters)?;
+) -> marking::Result<Copies> {
+    let (parameters, spelling) = (&options[0].parameters, Spelling::Keyword);
+    let on_ground = map.map(parameters)?;
     marking::check_extent(&on_ground, parameters)?;
     marking::check_scale(&on_ground, map.crs())?;
-    let (marked, parts) = embed(on_ground, key, (options, subject), job)?;
-    let distortion = Unmarked::new(&map.geometries, &on_ground, geos).distortion(&marked, parameters);
+    let (marked, parts) = embed(on_ground, key, options, job)?;
+    let geometries = map.geometries.as_ref().expect("the map was read with them");
+    let unmarked = Unmarked::new(geometries, &on_ground, geos);
     let described = (&map.data.vertices, map.crs());
-    let message = options.coefficients.is_none().then(|| subject.carried(key));
-    let mut warnings = marking::warnings(options, message.as_ref(), described, marked.patches, spelling);
-    warnings.extend(damage_warning(parameters, &marked.angles, Some(&distortion.areas), spelling));
-    let reference = marking::reference(described.0, described.1, marked.patches);
-    let lineage = Lineage { parts, ..Lineage::default() };
-    let record = marking::recorded(options, subject, key, (reference, lineage), distortion);
-    let moves = Moves { from: &map.data.vertices, to: &marked.coords };
-    let moved = layers.iter().map(|layer| layer.moved(&moves)).collect::<marking::Result<_>>()?;
-    Ok((moved, Record(record), warnings))
+    let (mut copies, mut warnings) = (Vec::new(), Vec::new());
+    for (marked, options) in marked.iter().zip(options) {
+        let subject = subject_of(options);
+        let distortion = unmarked.distortion(marked, parameters);
+        if copies.is_empty() {
+            let message = options.coefficients.is_none().then(|| subject.carried(key));
+            warnings = marking::warnings(options, message.as_ref(), described, marked.patches, spelling);
+            warnings.extend(damage_warning(parameters, &marked.angles, Some(&distortion.areas), spelling));
+        }
+        let reference = marking::reference(described.0, described.1, marked.patches);
+        let lineage = Lineage { parts: parts.clone(), ..Lineage::default() };
+        let record = marking::recorded(options, subject, key, (reference, lineage), distortion);
+        let moves = Moves { from: &map.data.vertices, to: &marked.coords };
+        let moved = layers.iter().map(|layer| layer.moved(&moves)).collect::<marking::Result<_>>()?;
+        copies.push((moved, Record(record)));
+    }
+    Ok(Copies { copies, warnings })
 }
 
+fn subject_of(options: &Options) -> &Subject {
+    options.subject.as_ref().expect("the package gives each")
+}
+
+/// Solves every patch once for all copies.
 fn embed(
     map: Map,
     key: &SecretKey,
-    (options, subject): (&Options, &Subject),
+    options: &[Options],
     job: &Job,
-) -> meshmark_core::Result<(Marked, Vec<PartEntry>)> {
-    let parameters = &options.parameters;
-    if let (Some(coefficients), Subject::Recipient(recipient)) = (options.coefficients, subject) {
+) -> meshmark_core::Result<(Vec<Marked>, Vec<PartEntry>)> {
+    let (parameters, subjects) = (&options[0].parameters, options.iter().map(subject_of));
+    if let Some(coefficients) = options[0].coefficients {
         let series = Series::of_one(map, parameters);
         let embedding = FingerprintEmbedding::new(&series, key, coefficients)?;
         job.start(embedding.patches());
-        let fingerprint = embedding.fingerprint(recipient);
-        let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| job.step())?;
-        return Ok((embedding.settle(&fingerprint, &wanted[0])?, embedding.part_entries()));
+        let recipients = subjects.map(|subject| subject.recipient().expect("a fingerprint has one"));
+        let fingerprints: Vec<_> = recipients.map(|recipient| embedding.fingerprint(recipient)).collect();
+        let wanted = embedding.wanted(&fingerprints, &|_| job.step())?;
+        let settled = fingerprints.iter().zip(&wanted).map(|(own, wanted)| embedding.settle(own, wanted));
+        return Ok((settled.collect::<Result<_, _>>()?, embedding.part_entries()));
     }
-    let message = subject.carried(key);
-    let embedding = Embedding::new(&map, key, message.len(), parameters)?;
+    let messages: Vec<_> = subjects.map(|subject| subject.carried(key)).collect();
+    let embedding = Embedding::new(&map, key, messages[0].len(), parameters)?;
     job.start(embedding.patches());
-    let wanted = embedding.wanted(std::slice::from_ref(&message), &|_| job.step())?;
-    Ok((embedding.settle(&message, &wanted[0])?, Vec::new()))
+    let wanted = embedding.wanted(&messages, &|_| job.step())?;
+    let settled = messages.iter().zip(&wanted).map(|(own, wanted)| embedding.settle(own, wanted));
+    Ok((settled.collect::<Result<_, _>>()?, Vec::new()))
 }

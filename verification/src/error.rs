@@ -13,7 +13,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[allow(missing_docs)] // the messages are the documentation
 pub enum Error {
     Core(meshmark_core::Error),
-    Unfit { reference: Option<String>, source: marking::Error },
+    Unfit { reference: Option<String>, source: Box<marking::Error> },
     Contradiction { option: String, value: String },
     PaperOfFingerprint,
     OtherKey { made_with: String, given: String },
@@ -46,7 +46,7 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Error::Core(source) => Some(source),
-            Error::Unfit { source, .. } => Some(source),
+            Error::Unfit { source, .. } => Some(&**source),
             _ => None,
         }
     }

@@ -18,5 +18,5 @@ pub mod verify;
 pub mod words;
 
 pub use error::{Error, Result};
-pub use maps::{Maps, Suited, Suspect};
+pub use maps::{IfSuited, Maps, Suited, Suspect};
 pub use stages::Stages;

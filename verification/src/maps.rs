@@ -29,7 +29,7 @@ pub trait Maps {
         reference: usize,
         layers: Option<&[String]>,
         srs: Option<&str>,
-    ) -> Result<Suited<Survey<Self::Crs>, Self::Error>, Self::Error>;
+    ) -> IfSuited<Survey<Self::Crs>, Self::Error>;
 
     /// Reads the vertices of a reference as an edition describes it; nothing where a map lacks its layers.
     ///
@@ -55,6 +55,9 @@ pub enum Suited<T, E> {
     /// The reference does not allow the mark; the error holds the reason.
     No(E),
 }
+
+/// A value, where the reference is suited to the request, or the error of a map that cannot be read.
+pub type IfSuited<T, E> = Result<Suited<T, E>, E>;
 
 impl<T, E> Suited<T, E> {
     /// Returns the value, for a request that names this very reference.

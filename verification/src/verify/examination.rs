@@ -7,7 +7,7 @@ use super::{
     request::{Request, Sought},
 };
 use crate::{
-    Error, Maps, Stages, Suited,
+    Error, IfSuited, Maps, Stages, Suited,
     report::{EvidenceMap, VertexCounts, sketch::Sketch},
 };
 use meshmark_core::{fingerprint_record::PartEntry, map::Map};
@@ -85,8 +85,9 @@ pub fn examine<M: Maps>(
     request: &Request,
     (reference, name, bases): (&Survey<M::Crs>, Option<String>, &Bases),
     stages: &mut Stages,
-) -> Result<Suited<Examination, M::Error>, M::Error> {
-    let unfit = |source| Suited::No(Error::Unfit { reference: name.clone(), source }.into());
+) -> IfSuited<Examination, M::Error> {
+    let unfit =
+        |source| Suited::No(Error::Unfit { reference: name.clone(), source: Box::new(source) }.into());
     let map = match reference.map(&request.parameters) {
         Ok(map) => map,
         Err(error) => return Ok(unfit(error)),

@@ -31,7 +31,7 @@ pub use records::{NamedRecord, verify_records};
 pub use references::read_reference;
 pub use request::{LARGEST_SIGNIFICANCE, ReadRecord, Request, Settings, Sought};
 
-use crate::{Maps, Stages, Suited, report::Report};
+use crate::{IfSuited, Maps, Stages, Suited, report::Report};
 use conclusion::{conclude, conclude_fingerprint};
 use meshmark_core::options::Subject;
 use meshmark_detection::decision::{Decision, Expected, Verdict};
@@ -87,7 +87,7 @@ fn verify_mark<M: Maps>(
     maps: &mut M,
     request: &Request,
     stages: &mut Stages,
-) -> Result<Suited<Verification<M::Crs>, M::Error>, M::Error> {
+) -> IfSuited<Verification<M::Crs>, M::Error> {
     let (number, reference) = match read_own_reference(maps, request, stages)? {
         Suited::Yes(own) => own,
         Suited::No(error) => return Ok(Suited::No(error)),

@@ -4,7 +4,7 @@ use super::{
     belonging::{check_reference, is_made_from},
     request::Request,
 };
-use crate::{Error, Maps, Stages, Suited};
+use crate::{Error, IfSuited, Maps, Stages, Suited};
 use meshmark_core::fingerprint_record::BaseEntry;
 use meshmark_marking::{self as marking, Bases, Lineage, Survey};
 
@@ -17,7 +17,7 @@ pub fn read_reference<M: Maps>(
     reference: usize,
     request: &Request,
     stages: &mut Stages,
-) -> Result<Suited<Survey<M::Crs>, M::Error>, M::Error> {
+) -> IfSuited<Survey<M::Crs>, M::Error> {
     stages.start("reading", 0);
     maps.reference(reference, request.layers.as_deref(), request.srs.as_deref())
 }
@@ -32,7 +32,7 @@ pub fn read_own_reference<M: Maps>(
     maps: &mut M,
     request: &Request,
     stages: &mut Stages,
-) -> Result<Suited<(usize, Survey<M::Crs>), M::Error>, M::Error> {
+) -> IfSuited<(usize, Survey<M::Crs>), M::Error> {
     let references = maps.references();
     if references == 1 {
         let reference = match read_reference(maps, 0, request, stages)? {
@@ -61,7 +61,7 @@ pub fn read_own_reference<M: Maps>(
 ///
 /// # Errors
 /// Fails when a reference is unreadable.
-pub fn read_bases<M: Maps>(maps: &mut M, request: &Request) -> Result<Suited<Bases, M::Error>, M::Error> {
+pub fn read_bases<M: Maps>(maps: &mut M, request: &Request) -> IfSuited<Bases, M::Error> {
     let Lineage { bases, anchors, .. } = request.lineage.clone();
     let references: Vec<usize> = (0..maps.references()).collect();
     let mut read =

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use meshmark_core::fingerprint_record::BaseEntry;
 use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
 use meshmark_marking as marking;
-use meshmark_verification::{Maps, Suited, Suspect};
+use meshmark_verification::{IfSuited, Maps, Suited, Suspect};
 use std::path::PathBuf;
 
 /// References and a suspect.
@@ -40,7 +40,7 @@ impl Maps for MapFiles {
         reference: usize,
         layers: Option<&[String]>,
         srs: Option<&str>,
-    ) -> Result<Suited<Survey, Error>> {
+    ) -> IfSuited<Survey, Error> {
         let landmarks = match self.landmarks.as_slice() {
             [] => LabelFields::All,
             names => LabelFields::Named(names),
