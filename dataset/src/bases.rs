@@ -4,14 +4,14 @@
 use crate::{Error, Result, Survey, sheets};
 use meshmark_core::{
     anchors::Anchors,
-    fingerprint_record::{BaseEntry, FingerprintRecord, PartEntry},
+    fingerprint_record::{BaseEntry, Divided, FingerprintRecord},
     ground::Ground,
     key::{SecretKey, read_text},
     map::Map,
     map_data::MapData,
     options::{Options, Parameters, join_list},
     recorded::Recorded,
-    series::{Census, Edition, Series},
+    series::{Edition, Series},
 };
 use meshmark_marking::{Crs, Lineage};
 use std::{
@@ -25,10 +25,12 @@ const SHARED: [&str; 6] = ["AMPLITUDE", "PATCH_SIZE", "TOLERANCE", "PRECISION", 
 /// Reads a reference as its entry describes it; returns nothing for a map without these layers.
 pub type ReadBase<'a, E> = dyn FnMut(&Path, &BaseEntry) -> std::result::Result<Option<Survey>, E> + 'a;
 
-/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors.
+/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors; or the
+/// size of the parts into which it is cut.
 #[derive(Default)]
 pub struct Bases {
     anchors: Anchors,
+    part_size: Option<usize>,
     entries: Vec<BaseEntry>,
     references: Vec<BaseMap>,
 }
@@ -57,7 +59,11 @@ impl Bases {
         let Some(named) = &options.bases else {
             return match options.base_references {
                 Some(_) => Err(Error::NoBase.into()),
-                None => Ok(Bases { anchors, ..Bases::default() }),
+                None => Ok(Bases {
+                    anchors,
+                    part_size: options.parts_of(map.data.vertices.len()),
+                    ..Bases::default()
+                }),
             };
         };
         let mut entries: Vec<BaseEntry> = Vec::new();
@@ -79,20 +85,21 @@ impl Bases {
         }
         let references = options.base_references.as_ref().ok_or(Error::NoBaseReference)?;
         let references: Vec<PathBuf> = references.iter().map(PathBuf::from).collect();
-        let bases = Bases::find((entries, anchors), &references, read)?;
+        let bases = Bases::find((entries, anchors), None, &references, read)?;
         match bases.have_any_of(map) {
             true => Ok(bases),
             false => Err(Error::OtherBase { base: join_list(named) }.into()),
         }
     }
 
-    /// Finds the reference of every entry among these files, for a map with these anchors; `read`
-    /// returns nothing for a file that lacks the layers of the entry.
+    /// Finds the reference of every entry among these files, for a map with these anchors or this size
+    /// of parts; `read` returns nothing for a file that lacks the layers of the entry.
     ///
     /// # Errors
     /// Fails on an entry without a reference, and on the errors of `read`.
     pub fn find<E: From<Error>>(
         (entries, anchors): (Vec<BaseEntry>, Anchors),
+        part_size: Option<usize>,
         files: &[PathBuf],
         read: &mut ReadBase<'_, E>,
     ) -> std::result::Result<Self, E> {
@@ -124,7 +131,7 @@ impl Bases {
             Ok::<BaseMap, Error>(BaseMap { data: survey.data, ground })
         };
         let references = found.into_iter().flatten().map(of_survey).collect::<Result<_>>()?;
-        Ok(Bases { anchors, entries, references })
+        Ok(Bases { anchors, part_size, entries, references })
     }
 
     fn have_any_of(&self, map: &Survey) -> bool {
@@ -134,14 +141,14 @@ impl Bases {
         map.data.vertices.coords().iter().any(is_there)
     }
 
-    /// Returns whether there are neither bases nor anchors, so that the map is one part.
+    /// Returns whether there are no bases, so that a map alone has all vertices.
     pub fn are_none(&self) -> bool {
-        self.entries.is_empty() && self.anchors.is_empty()
+        self.entries.is_empty()
     }
 
     /// Returns what a record says about the bases, the anchors, and the parts that follow from them.
-    pub fn lineage(&self, parts: Vec<PartEntry>, census: Option<Census>) -> Lineage {
-        Lineage { parts, bases: self.entries.clone(), anchors: self.anchors.clone(), census }
+    pub fn lineage(&self, divided: Divided) -> Lineage {
+        Lineage { divided, bases: self.entries.clone(), anchors: self.anchors.clone() }
     }
 
     /// Returns the series of the bases and a map that rests on them.
@@ -160,12 +167,14 @@ impl Bases {
             map: data.on(ground, ground),
             bases: entry.bases.iter().map(number).collect(),
             anchors: entry.anchors.as_slice(),
+            part_size: entry.part_size,
         };
         let mut editions: Vec<Edition> = self.entries.iter().zip(&self.references).map(edition).collect();
         editions.push(Edition {
             map,
             bases: (0..self.entries.len()).collect(),
             anchors: self.anchors.as_slice(),
+            part_size: self.part_size,
         });
         Series::new(editions, parameters)
     }
@@ -241,8 +250,7 @@ fn check_record(
         return Err(Error::BaseOfOtherMark { base: base(), option, made_with, given });
     }
     let whole = &record.reference.vertices_sha256;
-    let is_whole = record.bases.is_empty() && record.anchors.is_empty();
-    if is_whole && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
+    if record.is_whole() && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
         return Err(Error::BaseOfOtherParts { base: base() });
     }
     match options.coefficients == recorded.coefficients {

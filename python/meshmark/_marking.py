@@ -16,6 +16,7 @@ OPTIONS = (
     "basis",
     "chip_rate",
     "code",
+    "part_size",
     "patch_size",
     "precision",
     "shape",
@@ -59,7 +60,7 @@ def mark(
         ``bar = tqdm(); mark(..., progress=lambda done, all: (bar.reset(all), bar.update(done)))``.
     **options
         ``amplitude`` (metres RMS), ``tolerance`` (metres), ``precision`` (CRS units), ``patch_size``,
-        ``shape``, ``basis``, and for messages ``code`` and ``chip_rate``, as the driver has them.
+        ``part_size``, ``shape``, ``basis``, and for messages ``code`` and ``chip_rate``, as the driver has them.
 
     Returns
     -------

@@ -10,12 +10,12 @@ use crate::{
 };
 use meshmark_core::{
     embedding::{Embedding, Marked},
-    fingerprint::FingerprintEmbedding,
-    fingerprint_record::PartEntry,
+    fingerprint_embedding::FingerprintEmbedding,
+    fingerprint_record::Divided,
     key::SecretKey,
     map::Map,
     options::{Options, Spelling, Subject},
-    series::Series,
+    series::{Edition, Series},
 };
 use meshmark_marking::{self as marking, Lineage, Moves, ThreadPool, Unmarked, damage_warning};
 use pyo3::{exceptions::PyOSError, prelude::*, types::PyBytes};
@@ -79,14 +79,14 @@ fn marked(
     let on_ground = map.metric.map(&map.data, parameters)?;
     marking::check_extent(&on_ground, parameters)?;
     marking::check_scale(&on_ground, map.crs())?;
-    let (marked, parts) = embed(on_ground, key, (options, subject), job)?;
+    let (marked, divided) = embed(on_ground, key, (options, subject), job)?;
     let distortion = Unmarked::new(&map.geometries, &on_ground, geos).distortion(&marked, parameters);
     let described = (&map.data.vertices, map.crs());
     let message = options.coefficients.is_none().then(|| subject.carried(key));
     let mut warnings = marking::warnings(options, message.as_ref(), described, marked.patches, spelling);
     warnings.extend(damage_warning(parameters, &marked.angles, Some(&distortion.areas), spelling));
     let reference = marking::reference(described.0, described.1, marked.patches);
-    let lineage = Lineage { parts, ..Lineage::default() };
+    let lineage = Lineage { divided, ..Lineage::default() };
     let record = marking::recorded(options, subject, key, (reference, lineage), distortion);
     let moves = Moves { from: &map.data.vertices, to: &marked.coords };
     let moved = layers.iter().map(|layer| layer.moved(&moves)).collect::<marking::Result<_>>()?;
@@ -98,19 +98,23 @@ fn embed(
     key: &SecretKey,
     (options, subject): (&Options, &Subject),
     job: &Job,
-) -> meshmark_core::Result<(Marked, Vec<PartEntry>)> {
+) -> meshmark_core::Result<(Marked, Divided)> {
     let parameters = &options.parameters;
     if let (Some(coefficients), Subject::Recipient(recipient)) = (options.coefficients, subject) {
-        let series = Series::of_one(map, parameters);
+        let part_size = options.parts_of(map.vertices.len());
+        let edition = Edition { map, bases: Vec::new(), anchors: &[], part_size };
+        let series = Series::new(vec![edition], parameters)?;
         let embedding = FingerprintEmbedding::new(&series, key, coefficients)?;
         job.start(embedding.patches());
         let fingerprint = embedding.fingerprint(recipient);
-        let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| job.step())?;
-        return Ok((embedding.settle(&fingerprint, &wanted[0])?, embedding.part_entries()));
+        let mut wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| job.step())?;
+        let wanted = wanted.pop().expect("one for each fingerprint");
+        let divided = embedding.divided(&wanted);
+        return Ok((embedding.settle(&fingerprint, wanted)?, divided));
     }
     let message = subject.carried(key);
     let embedding = Embedding::new(&map, key, message.len(), parameters)?;
     job.start(embedding.patches());
     let wanted = embedding.wanted(std::slice::from_ref(&message), &|_| job.step())?;
-    Ok((embedding.settle(&message, &wanted[0])?, Vec::new()))
+    Ok((embedding.settle(&message, &wanted[0])?, Divided::default()))
 }

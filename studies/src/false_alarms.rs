@@ -129,6 +129,7 @@ pub(crate) fn examine(
         subject: None,
         sought,
         lineage: Default::default(),
+        part_size: 0,
         tried: 1,
         parameters,
         layers: None,

@@ -142,8 +142,9 @@ pub fn examine(
         Ok(compared) => compared,
         Err(error) => return Ok(unfit(error)), // this comes before the search for the map
     };
-    if !bases.are_none() && !has_parts(&compared, &request.lineage.parts) {
-        return Ok(Suited::No(Error::OtherPartsOfBases { parts: request.lineage.parts.len() }));
+    let recorded = &request.lineage.divided.parts;
+    if !recorded.is_empty() && !has_parts(&compared, recorded) {
+        return Ok(Suited::No(Error::OtherPartsOfBases { parts: recorded.len() }));
     }
     let Registered { map: suspect, registration } =
         register(request, (reference, &compared), suspect, progress)?;

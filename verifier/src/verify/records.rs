@@ -201,7 +201,8 @@ impl Group {
 fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
-        let (sought, Options { parameters, layers, srs, .. }) = (candidate.sought(), &candidate.options);
+        let (sought, part_size) = (candidate.sought(), candidate.options.part_size);
+        let Options { parameters, layers, srs, .. } = &candidate.options;
         let lineage = lineage_of(&candidate.read.record);
         let same = |group: &&mut Group| {
             let r = &group.request;
@@ -210,13 +211,14 @@ fn groups(request: &Request, candidates: Vec<Candidate>) -> Vec<Group> {
                 && r.srs == *srs
                 && r.sought.is_like(&sought)
                 && r.lineage == lineage
+                && r.part_size == part_size
         };
         if let Some(group) = groups.iter_mut().find(same) {
             group.candidates.push(candidate);
             continue;
         }
         let (parameters, layers, srs) = (parameters.clone(), layers.clone(), srs.clone());
-        let request = Request { parameters, layers, srs, sought, lineage, ..request.clone() };
+        let request = Request { parameters, layers, srs, sought, lineage, part_size, ..request.clone() };
         groups.push(Group { request, candidates: vec![candidate] });
     }
     groups

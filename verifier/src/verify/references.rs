@@ -47,5 +47,6 @@ pub fn read_own_reference(
 /// Fails when a reference is unreadable, and when one is missing.
 pub fn read_bases(request: &Request, references: &[PathBuf]) -> Result<Bases> {
     let Lineage { bases, anchors, .. } = request.lineage.clone();
-    Bases::find((bases, anchors), references, &mut maps::base_reference)
+    let part_size = Some(request.part_size).filter(|part_size| *part_size > 0);
+    Bases::find((bases, anchors), part_size, references, &mut maps::base_reference)
 }
