@@ -73,7 +73,8 @@ impl<'a> FingerprintEmbedding<'a> {
     /// [`crate::Error::PrecisionTooCoarse`].
     pub fn new(series: &'a Series<'a>, key: &'a SecretKey, coefficients: usize) -> Result<Self> {
         let room = |patches: &Patches| patches.check_room(coefficients);
-        let (mut works, mut named): (Vec<Work>, Vec<(PartDigest, usize)>) = Default::default();
+        let mut works: Vec<Work> = Vec::new();
+        let mut named: Vec<(PartDigest, usize)> = Vec::new();
         for edition in 0..series.len() {
             let first = named.len();
             if let Some(boxes) = series.boxes(edition) {

@@ -205,7 +205,8 @@ impl<'a> Series<'a> {
             patches.check_room(coefficients)?;
             Ok(patches)
         };
-        let (mut counts, mut all): (Vec<(PartDigest, usize)>, Vec<(Patches, Vec<u32>)>) = Default::default();
+        let mut counts: Vec<(PartDigest, usize)> = Vec::new();
+        let mut all: Vec<(Patches, Vec<u32>)> = Vec::new();
         for edition in 0..self.editions.len() {
             for number in 0..self.boxes(edition).map_or(0, Boxes::len) {
                 let boxes = self.boxes(edition).expect("it has some");
