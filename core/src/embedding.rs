@@ -54,10 +54,15 @@ impl Marked {
 
 /// A mark is read back from this many patches, which are solved again; from all patches only if
 /// that fails.
-const READ_BACK_PATCHES: usize = 16;
+pub(crate) const READ_BACK_PATCHES: usize = 16;
 
-/// The memory for the wanted displacements of a batch of marks, bytes: 16 for each vertex and mark.
+/// The memory for the displacements or places of a batch of marks, bytes: 16 for each vertex and mark.
 const MOST_BATCH_BYTES: usize = 512 << 20;
+
+/// Returns how many marks of so many vertices, at least one, are handled at once.
+pub(crate) fn batch_of(vertices: usize) -> usize {
+    (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * vertices)).max(1)
+}
 
 /// Marks a map: Δ = E(α · p ∘ b′) on both axes of every patch. T-junctions stay, no vertex passes
 /// through a segment, and every vertex stays within the tolerance and on the output grid. The
@@ -99,7 +104,7 @@ impl<'a> Embedding<'a> {
     /// # Errors
     /// Fails on a patch that cannot be solved.
     pub fn for_many(self) -> Result<Self> {
-        Ok(Embedding { groundwork: self.groundwork.for_many()?, ..self })
+        Ok(Embedding { groundwork: self.groundwork.for_many(READ_BACK_PATCHES)?, ..self })
     }
 
     /// Returns how many patches there are.
@@ -150,7 +155,7 @@ impl<'a> Embedding<'a> {
             let (from, bits) = ((&patches, &bases[..]), message.len());
             joint_solved(from, &self.carrier, &observed, bits, parameters, &disturbance)
         };
-        if read(self.groundwork.first_patches())?.message() == *message {
+        if read(self.groundwork.patches.head(READ_BACK_PATCHES))?.message() == *message {
             return Ok(());
         }
         match read(self.groundwork.patches.clone())?.message().errors(message) {
@@ -188,9 +193,10 @@ impl<'a> Groundwork<'a> {
         Ok(Groundwork { map, placement, tree, patches, bases: Vec::new(), coefficients, parameters })
     }
 
-    /// Solves for the bases of the patches from which each mark is read back first, and keeps them.
-    pub fn for_many(mut self) -> Result<Self> {
-        let first = self.patches.as_slice().par_iter().take(READ_BACK_PATCHES);
+    /// Solves for the bases of the first patches, from which each mark is read back first, and keeps
+    /// them.
+    pub fn for_many(mut self, read_back: usize) -> Result<Self> {
+        let first = self.patches.as_slice().par_iter().take(read_back);
         let bases = first.map(|patch| Basis::low_frequencies(patch, self.coefficients + 1));
         self.bases = bases.collect::<Result<_>>()?;
         Ok(self)
@@ -198,7 +204,7 @@ impl<'a> Groundwork<'a> {
 
     /// Returns how many marks, at least one, [`Self::wanted`] handles at once within its memory.
     pub fn batch(&self) -> usize {
-        (MOST_BATCH_BYTES / (size_of::<[f64; 2]>() * self.map.vertices.len())).max(1)
+        batch_of(self.map.vertices.len())
     }
 
     /// Returns the displacements that are the marks, for the signs of each those of all vertices,
@@ -276,11 +282,6 @@ impl<'a> Groundwork<'a> {
         let noise_m = rounding_m.hypot(deviation_m).max(LEAST_NOISE_M);
         let disturbance = Prediction::of_noise(noise_m, observed.len());
         (observed, disturbance)
-    }
-
-    /// Returns the patches from which a mark is read back first.
-    pub fn first_patches(&self) -> Patches {
-        self.patches.head(READ_BACK_PATCHES)
     }
 }
 

@@ -13,6 +13,7 @@ pub enum Error {
     NoVertices,
     TooFewVertices { vertices: usize, patch_size: usize, code: Code, chip_rate: usize },
     TooFewFree { free: usize, vertices: usize, patch_size: usize },
+    TooFewInParts { vertices: usize, patch_size: usize },
     Collinear { vertices: usize },
     TooManyCoefficients { code: Code, bits: usize, chip_rate: usize, vertices: usize, of: usize },
     TooManySigns { coefficients: usize, vertices: usize, of: usize },
@@ -34,6 +35,8 @@ pub enum Error {
     IllegalValue { option: &'static str, value: String, kind: Kind },
     BothSubjects,
     OfMessage { option: &'static str },
+    PartsBeside { option: &'static str },
+    SmallParts { part_size: usize, least: usize },
     NoReference,
 }
 
@@ -95,6 +98,8 @@ pub enum RecordFault {
     Coefficients { found: usize, most: usize },
     Digest { text: String },
     Anchors,
+    PartsBesideOthers,
+    PartSize,
     NoPart,
     UnknownBase { digest: String },
     OwnBase,
@@ -123,6 +128,10 @@ impl fmt::Display for RecordFault {
             }
             RecordFault::OwnBase => f.write_str("it names its own edition as a base"),
             RecordFault::Anchors => f.write_str("it names anchors that are no vertices of its reference"),
+            RecordFault::PartsBesideOthers => {
+                f.write_str("it cuts into parts a map that rests on others or fits them")
+            }
+            RecordFault::PartSize => f.write_str("it cuts a map into parts of no vertices"),
             RecordFault::NoPart => f.write_str("it names no part of the map"),
             RecordFault::NoRecipient => f.write_str("it has no recipient"),
         }
@@ -170,6 +179,11 @@ impl Error {
                  use a smaller {}, or plan larger sheets, or sheets that overlap less",
                 spelling.value("PATCH_SIZE", patch_size),
                 name("PATCH_SIZE")
+            ),
+            Error::TooFewInParts { vertices, patch_size } => format!(
+                "of the parts into which the {vertices} vertices are cut, none has enough away from its borders for {}: use a                  larger {}, or 0 for one part",
+                spelling.value("PATCH_SIZE", patch_size),
+                name("PART_SIZE")
             ),
             Error::Collinear { vertices } => format!(
                 "all {vertices} distinct vertices lie on one straight line, so they have no mesh: mark a map whose \
@@ -266,6 +280,16 @@ impl Error {
                 name("RECIPIENT"),
                 name("CODE"),
                 name("CHIP_RATE")
+            ),
+            Error::PartsBeside { option } => format!(
+                "{} and {} are both given, and a map that rests on others or fits them is not cut: leave out {}",
+                name("PART_SIZE"),
+                name(option),
+                name("PART_SIZE")
+            ),
+            Error::SmallParts { part_size, least } => format!(
+                "{} is too small for a part of several patches: use at least {least}, or 0 for one part",
+                spelling.value("PART_SIZE", part_size)
             ),
             Error::BothSubjects => {
                 format!("both {} and {} are given: give exactly one", name("RECIPIENT"), name("MESSAGE"))

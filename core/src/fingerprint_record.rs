@@ -77,6 +77,9 @@ pub struct FingerprintShape {
     pub basis: Laplacian,
     /// Grid of the marked coordinates, CRS units; null where it is not rounded.
     pub precision_crs_units: Option<f64>,
+    /// The map is cut into parts of nearly so many vertices; omitted where it is one part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part_size: Option<usize>,
 }
 
 /// The reference map, as a record describes it.
@@ -116,6 +119,18 @@ pub struct BaseEntry {
     /// Its vertices that stay in place; omitted when there are none.
     #[serde(default, skip_serializing_if = "Anchors::is_empty")]
     pub anchors: Anchors,
+    /// It is cut into parts of nearly so many vertices; omitted where it is one part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part_size: Option<usize>,
+}
+
+/// How a map is divided, as a record describes it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Divided {
+    /// The parts of the map and its bases.
+    pub parts: Vec<PartEntry>,
+    /// How the vertices of the map are divided, where they are not all free.
+    pub census: Option<Census>,
 }
 
 /// A part of the map, as a record describes it.
@@ -132,8 +147,8 @@ pub struct PartEntry {
 
 impl FingerprintShape {
     /// Returns the shape of a fingerprint with these parameters; those of a message are not part of
-    /// it.
-    pub fn new(coefficients: usize, parameters: &Parameters) -> Self {
+    /// it. `part_size` is given where the map is cut into parts.
+    pub fn new(coefficients: usize, parameters: &Parameters, part_size: Option<usize>) -> Self {
         let Parameters { amplitude_m, patch_size, tolerance_m, shape, basis, precision_crs_units, .. } =
             *parameters;
         FingerprintShape {
@@ -144,6 +159,7 @@ impl FingerprintShape {
             shape,
             basis,
             precision_crs_units,
+            part_size,
         }
     }
 
@@ -201,7 +217,13 @@ impl FingerprintRecord {
             bases: None,
             base_references: None,
             sheets: None,
+            part_size: self.mark.part_size.unwrap_or(0),
         }
+    }
+
+    /// Returns whether all vertices of the map are in one part that is named by their digest.
+    pub fn is_whole(&self) -> bool {
+        self.bases.is_empty() && self.anchors.is_empty() && self.mark.part_size.is_none()
     }
 
     /// Returns the editions that a later one rests on if this is its base, this one last.
@@ -213,6 +235,7 @@ impl FingerprintRecord {
             srs: self.srs.clone(),
             bases: self.bases.iter().map(digest).collect(),
             anchors: self.anchors.clone(),
+            part_size: self.mark.part_size,
         };
         self.bases.iter().cloned().chain([own]).collect()
     }
@@ -249,6 +272,12 @@ impl FingerprintRecord {
         }
         if !self.anchors.fit(self.reference.vertices) {
             return fault(RecordFault::Anchors);
+        }
+        if self.mark.part_size.is_some() && !(self.bases.is_empty() && self.anchors.is_empty()) {
+            return fault(RecordFault::PartsBesideOthers);
+        }
+        if self.mark.part_size == Some(0) || self.bases.iter().any(|base| base.part_size == Some(0)) {
+            return fault(RecordFault::PartSize);
         }
         if self.parts.is_empty() {
             return fault(RecordFault::NoPart);
@@ -290,7 +319,7 @@ mod tests {
             software: "meshmark 0.1.0".into(),
             key_commitment: SecretKey::from_bytes([7; 32]).commitment(),
             recipient: "ACME GmbH".into(),
-            mark: FingerprintShape::new(256, &Parameters::of_fingerprint()),
+            mark: FingerprintShape::new(256, &Parameters::of_fingerprint(), None),
             layers: None,
             srs: None,
             reference: ReferenceEntry {

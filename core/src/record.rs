@@ -155,6 +155,7 @@ impl Record {
             bases: None,
             base_references: None,
             sheets: None,
+            part_size: 0,
         };
         options.check().map_err(illegal)?;
         Ok(options)

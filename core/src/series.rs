@@ -8,23 +8,21 @@
 //!
 //! The *anchors* of an edition, which other sheets of the map have or are near to, stay in place
 //! whatever its bases have, and vertices are attached to them likewise.
+//!
+//! A large edition without either is cut into boxes, each a part of its own.
 
 use crate::{
     Error, Result,
-    bodies::{Body, Motion},
-    constraints::Constraints,
+    boxes::{BoxMap, Boxes},
+    changes::{Changes, Origin},
     embedding::Groundwork,
     map::Map,
-    nearness::VertexTree,
     options::Parameters,
     part::{PartDigest, Parts},
     patches::Patches,
-    placement::Placement,
-    topology::{Settled, settle},
-    vertices::VertexTable,
+    topology::Settled,
 };
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// The editions of a map, the oldest first.
 pub struct Series<'a> {
@@ -40,6 +38,9 @@ pub struct Edition<'a> {
     pub bases: Vec<usize>,
     /// Canonical indices of the vertices that stay in place, ascending.
     pub anchors: &'a [u32],
+    /// A map of more vertices without bases and anchors is cut into parts of nearly so many; `None`
+    /// leaves it in one part, whatever its size.
+    pub part_size: Option<usize>,
 }
 
 /// How the vertices of an edition are divided.
@@ -59,50 +60,31 @@ pub struct Census {
 /// An edition among those before it.
 struct Placed<'a> {
     map: Map<'a>,
-    rests_on_bases: bool,
-    /// What bases and anchors determine; `None` without any.
-    changes: Option<Changes<'a>>,
+    division: Division<'a>,
 }
 
-/// Where a vertex comes from that does not move freely.
-#[derive(Clone, Copy)]
-enum Origin {
-    /// An edition and the index of the vertex there.
-    Base(usize, u32),
-    Anchor,
-}
-
-/// What an edition changes on its bases.
-struct Changes<'a> {
-    /// For every vertex that stands, what determines its place.
-    origins: Vec<Option<Origin>>,
-    tree: VertexTree<'a>,
-    placement: Placement<'a>,
-    /// The constraints on the vertices that do not stand.
-    constraints: Constraints,
-    attached: Vec<Attached>,
-    part: OwnPart,
-}
-
-/// Vertices that follow standing ones together.
-struct Attached {
-    followers: Vec<u32>,
-    standing: Vec<u32>,
-}
-
-/// The part of an edition with bases, as a map.
-struct OwnPart {
-    /// Its vertices on the map of the edition, ascending.
-    indices: Vec<u32>,
-    vertices: VertexTable,
-    segments: Vec<[u32; 2]>,
-    polygon_roots: Vec<u32>,
+/// What determines the movement of the vertices of an edition.
+enum Division<'a> {
+    /// All of them are free.
+    Whole,
+    /// Bases and anchors determine some. Whether there may be too few others for a part.
+    Changed(Box<Changes<'a>>, bool),
+    /// Each box is a part.
+    Boxes(Boxes<'a>),
 }
 
 impl<'a> Series<'a> {
     /// Returns the series of a single map.
     pub fn of_one(map: Map<'a>, parameters: &'a Parameters) -> Self {
-        Series { editions: vec![Placed { map, rests_on_bases: false, changes: None }], parameters }
+        Series { editions: vec![Placed { map, division: Division::Whole }], parameters }
+    }
+
+    /// Returns the series of a box of a map, which may have too few free vertices for a part.
+    pub(crate) fn of_box(map: Map<'a>, anchors: &[u32], parameters: &'a Parameters) -> Result<Self> {
+        let mut origins = vec![None; map.vertices.len()];
+        anchors.iter().for_each(|&v| origins[v as usize] = Some(Origin::Anchor));
+        let division = Division::Changed(Box::new(Changes::new(map, origins, parameters)?), true);
+        Ok(Series { editions: vec![Placed { map, division }], parameters })
     }
 
     /// Creates a series from editions, the oldest first.
@@ -112,21 +94,26 @@ impl<'a> Series<'a> {
     pub fn new(editions: Vec<Edition<'a>>, parameters: &'a Parameters) -> Result<Self> {
         let mut series = Series { editions: Vec::new(), parameters };
         for edition in editions {
-            let Edition { map, ref bases, anchors } = edition;
+            let Edition { map, ref bases, anchors, part_size } = edition;
             let vertices = map.vertices.len();
             if anchors.iter().any(|&v| v as usize >= vertices) {
                 return Err(Error::Anchors { vertices });
             }
-            let changes = match bases.is_empty() && anchors.is_empty() {
-                true => None,
-                false => Some(Changes::new(map, series.origins(&edition), parameters)?),
+            let is_free = bases.is_empty() && anchors.is_empty();
+            let division = match part_size.filter(|part_size| vertices > *part_size) {
+                Some(part_size) if is_free => Division::Boxes(Boxes::new(map, part_size, parameters)),
+                _ if is_free => Division::Whole,
+                _ => {
+                    let changes = Changes::new(map, series.origins(&edition), parameters)?;
+                    Division::Changed(Box::new(changes), !bases.is_empty())
+                }
             };
-            series.editions.push(Placed { map, rests_on_bases: !bases.is_empty(), changes });
+            series.editions.push(Placed { map, division });
         }
         Ok(series)
     }
 
-    fn origins(&self, Edition { map, bases, anchors }: &Edition) -> Vec<Option<Origin>> {
+    fn origins(&self, Edition { map, bases, anchors, .. }: &Edition) -> Vec<Option<Origin>> {
         let origin = |point: &[f64; 2]| {
             let find = |&base: &usize| {
                 Some(Origin::Base(base, self.editions[base].map.vertices.index_of(*point)? as u32))
@@ -151,77 +138,104 @@ impl<'a> Series<'a> {
         self.editions.len()
     }
 
-    /// Returns the part of an edition as a map.
-    fn part(&self, edition: usize) -> Map<'_> {
-        let Placed { map, changes, .. } = &self.editions[edition];
-        let Some(Changes { part, .. }) = changes else { return *map };
-        let OwnPart { vertices, segments, polygon_roots, .. } = part;
-        Map { vertices, segments, polygon_roots, ..*map }
+    /// Returns the boxes of an edition that is cut into some.
+    pub(crate) fn boxes(&self, edition: usize) -> Option<&Boxes<'a>> {
+        match &self.editions[edition].division {
+            Division::Boxes(boxes) => Some(boxes),
+            _ => None,
+        }
     }
 
-    /// Returns what `make` makes of the part of every edition that has one. New vertices are none
-    /// where they are too few, on one line, or have no room for the coefficients.
-    pub(crate) fn parts<'s, T>(
+    /// Returns what `make` makes of the part of an edition, which is not in boxes, if it has one. New
+    /// vertices are none where they are too few, on one line, or have no room for the coefficients.
+    pub(crate) fn part<'s, T>(
         &'s self,
+        edition: usize,
         make: impl Fn(Map<'s>) -> Result<T>,
-    ) -> Result<Vec<(usize, Map<'s>, T)>> {
-        let mut parts = Vec::new();
-        for number in 0..self.editions.len() {
-            let (map, Placed { changes, rests_on_bases, .. }) = (self.part(number), &self.editions[number]);
-            let is_small = changes.is_some() && map.vertices.len() < self.parameters.patch_size;
-            match if is_small { None } else { Some(make(map)) } {
-                Some(Ok(made)) => parts.push((number, map, made)),
-                Some(Err(error)) if changes.is_none() || !is_of_small_part(&error) => return Err(error),
-                _ if !rests_on_bases => return Err(self.too_few_free(number)),
-                _ => {}
+    ) -> Result<Option<(Map<'s>, T)>> {
+        let Placed { map, division } = &self.editions[edition];
+        let Division::Changed(changes, may_be_small) = division else {
+            return make(*map).map(|made| Some((*map, made)));
+        };
+        let part = changes.part.on(map);
+        let is_small = part.vertices.len() < self.parameters.patch_size;
+        match if is_small { None } else { Some(make(part)) } {
+            Some(Ok(made)) => Ok(Some((part, made))),
+            Some(Err(error)) if !is_of_small_part(&error) => Err(error),
+            _ if *may_be_small => Ok(None),
+            _ => {
+                let (free, vertices) = (part.vertices.len(), map.vertices.len());
+                Err(Error::TooFewFree { free, vertices, patch_size: self.parameters.patch_size })
             }
         }
-        Ok(parts)
     }
 
-    fn too_few_free(&self, number: usize) -> Error {
-        let vertices = self.editions[number].map.vertices.len();
-        let patch_size = self.parameters.patch_size;
-        Error::TooFewFree { free: self.part(number).vertices.len(), vertices, patch_size }
+    /// Returns what bases and anchors leave to the newest map.
+    fn changes(&self) -> Option<&Changes<'a>> {
+        match &self.editions.last()?.division {
+            Division::Changed(changes, _) => Some(changes),
+            _ => None,
+        }
     }
 
-    /// Returns how the vertices of the newest map are divided; `None` where they are all free.
-    pub fn census(&self) -> Option<Census> {
-        let changes = self.editions.last()?.changes.as_ref()?;
+    /// Returns how the vertices of the newest map are divided; `None` where they are all free, or in
+    /// boxes.
+    pub(crate) fn census(&self) -> Option<Census> {
+        let changes = self.changes()?;
         let count = |is_meant: fn(&Origin) -> bool| {
             changes.origins.iter().flatten().filter(|origin| is_meant(origin)).count()
         };
         let standing = count(|origin| matches!(origin, Origin::Base(..)));
         let anchored = count(|origin| matches!(origin, Origin::Anchor));
-        let free = changes.part.indices.len();
+        let free = changes.part.len();
         let attached = changes.origins.len() - standing - anchored - free;
         Some(Census { standing, anchored, attached, free })
     }
 
     /// Returns the patches of all parts on `map`, which has the vertices of all editions, and the
-    /// parts.
+    /// parts. A box with too few free vertices is a part without patches.
     ///
     /// # Errors
     /// Returns the errors of [`Patches::new`] and [`Patches::check_room`].
     pub fn patches_on(&self, map: &Map, coefficients: usize) -> Result<(Patches, Parts)> {
-        let parts = self.parts(|part| {
+        let index = |point: &[f64; 2]| map.vertices.index_of(*point).expect("it has all vertices") as u32;
+        let placed = |part: Map, patches| (patches, part.vertices.coords().iter().map(index).collect());
+        let patches = |part: Map| {
             let patches = Patches::new(&part, self.parameters)?;
             patches.check_room(coefficients)?;
             Ok(patches)
-        })?;
-        let index = |point: &[f64; 2]| map.vertices.index_of(*point).expect("it has all vertices") as u32;
-        let placed = parts.into_iter().map(|(_, part, patches)| {
-            let digest = PartDigest::new(part.vertices);
-            (digest, patches, part.vertices.coords().iter().map(index).collect::<Vec<u32>>())
-        });
-        let placed: Vec<_> = placed.collect();
-        let counts = placed.iter().map(|(digest, patches, _)| (*digest, patches.as_slice().len()));
-        let parts = Parts::in_turn(counts);
-        Ok((Patches::in_turn(map, placed.into_iter().map(|(_, patches, on_map)| (patches, on_map))), parts))
+        };
+        let mut counts: Vec<(PartDigest, usize)> = Vec::new();
+        let mut all: Vec<(Patches, Vec<u32>)> = Vec::new();
+        for edition in 0..self.editions.len() {
+            for number in 0..self.boxes(edition).map_or(0, Boxes::len) {
+                let boxes = self.boxes(edition).expect("it has some");
+                let BoxMap { submap, anchors, .. } = boxes.cut(number);
+                let of_box = Series::of_box(submap.on(boxes.map()), &anchors, self.parameters)?;
+                let found = of_box.part(0, patches)?;
+                counts.push((boxes.digest(number), found.as_ref().map_or(0, |(_, p)| p.as_slice().len())));
+                all.extend(found.map(|(part, patches)| placed(part, patches)));
+            }
+            if self.boxes(edition).is_none()
+                && let Some((part, patches)) = self.part(edition, patches)?
+            {
+                counts.push((PartDigest::new(part.vertices), patches.as_slice().len()));
+                all.push(placed(part, patches));
+            }
+        }
+        if all.is_empty() {
+            return Err(self.without_parts());
+        }
+        Ok((Patches::in_turn(map, all.into_iter()), Parts::in_turn(counts)))
     }
 
-    /// Moves an edition, after those before it have been moved. `wanted` are the displacements of
-    /// its part, CRS units, none where it has none.
+    /// Returns the error of a series of which no part has enough free vertices.
+    pub(crate) fn without_parts(&self) -> Error {
+        Error::TooFewInParts { vertices: self.map().vertices.len(), patch_size: self.parameters.patch_size }
+    }
+
+    /// Moves an edition that is not in boxes, after those before it have been moved. `wanted` are the
+    /// displacements of its part, CRS units, none where it has none.
     pub(crate) fn settle(
         &self,
         number: usize,
@@ -230,7 +244,9 @@ impl<'a> Series<'a> {
         before: &[Settled],
     ) -> Settled {
         match (&self.editions[number], groundwork) {
-            (Placed { map, changes: Some(changes), .. }, _) => changes.settle(*map, wanted, before),
+            (Placed { map, division: Division::Changed(changes, _) }, _) => {
+                changes.settle(*map, wanted, before)
+            }
             (_, Some(groundwork)) => groundwork.settle(wanted),
             (_, None) => unreachable!("an edition without bases and anchors is a part"),
         }
@@ -239,126 +255,11 @@ impl<'a> Series<'a> {
     /// Returns how many vertices of the newest map hang on a segment, of which only those count that
     /// do not stand; `None` without bases and anchors.
     pub(crate) fn hanging(&self) -> Option<usize> {
-        let changes = self.editions.last()?.changes.as_ref()?;
-        Some(changes.constraints.junctions.hanging().len())
+        Some(self.changes()?.constraints.junctions.hanging().len())
     }
 }
 
 /// Returns whether vertices of a part are on one line, or have no room for the coefficients.
 fn is_of_small_part(error: &Error) -> bool {
     matches!(error, Error::Collinear { .. } | Error::TooManySigns { .. })
-}
-
-impl<'a> Changes<'a> {
-    fn new(map: Map<'a>, origins: Vec<Option<Origin>>, parameters: &Parameters) -> Result<Self> {
-        let (placement, tree) = (Placement::new(&map, parameters)?, VertexTree::of_all(&map));
-        let stands: Vec<bool> = origins.iter().map(Option::is_some).collect();
-        let (constraints, torn) = Constraints::around(&map, &tree, parameters.shape, &stands);
-        let attached = attach(&map, &constraints, &torn, &stands);
-        let mut is_own: Vec<bool> = stands.iter().map(|stands| !stands).collect();
-        attached.iter().flat_map(|group| &group.followers).for_each(|&v| is_own[v as usize] = false);
-        for hanging in constraints.junctions.hanging() {
-            // Its anchors are free, or belong to bodies.
-            if hanging.anchors.iter().any(|(anchor, _)| !is_own[*anchor as usize]) {
-                is_own[hanging.vertex as usize] = false;
-            }
-        }
-        let part = OwnPart::new(&map, &is_own);
-        Ok(Changes { origins, tree, placement, constraints, attached, part })
-    }
-
-    fn settle(&self, map: Map, of_part: &[[f64; 2]], before: &[Settled]) -> Settled {
-        let place = |(from, origin): (&[f64; 2], &Option<Origin>)| match *origin {
-            None => None,
-            Some(Origin::Base(edition, vertex)) => Some(before[edition].coords[vertex as usize]),
-            Some(Origin::Anchor) => Some(self.placement.place(*from, [0.0; 2])),
-        };
-        let from = map.vertices.coords();
-        let standing: Vec<Option<[f64; 2]>> = from.iter().zip(&self.origins).map(place).collect();
-        let moved = |(from, to): (&[f64; 2], &Option<[f64; 2]>)| {
-            to.map_or([0.0; 2], |to| [to[0] - from[0], to[1] - from[1]])
-        };
-        let mut wanted: Vec<[f64; 2]> = from.iter().zip(&standing).map(moved).collect();
-        self.part
-            .indices
-            .iter()
-            .zip(of_part)
-            .for_each(|(&v, displacement)| wanted[v as usize] = *displacement);
-        self.attached.iter().for_each(|group| group.follow(&map, &mut wanted));
-        settle(&map, &self.tree, (&self.constraints, &standing), &wanted, &self.placement)
-    }
-}
-
-/// Returns the vertices that a segment or a body joins to standing ones, with these. The bodies that
-/// have standing vertices are `torn`.
-fn attach(map: &Map, constraints: &Constraints, torn: &[Body], stands: &[bool]) -> Vec<Attached> {
-    let of_body = |body: &Body| {
-        let (standing, followers) = body.members.iter().partition(|&&v| stands[v as usize]);
-        Attached { followers, standing }
-    };
-    let mut attached: Vec<Attached> = torn.iter().map(of_body).collect();
-    let mut is_attached = stands.to_vec();
-    torn.iter().flat_map(|body| &body.members).for_each(|&v| is_attached[v as usize] = true);
-    // A body is named by its first vertex.
-    let mover = |v: u32| {
-        let body = constraints.bodies.number_at(v).map(|body| &constraints.bodies.as_slice()[body]);
-        body.map_or(v, |body| body.members[0])
-    };
-    let mut others: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (new, old) in map.segments.iter().flat_map(|&[a, b]| [(a, b), (b, a)]) {
-        let hangs = constraints.junctions.hanging_at(new).is_some();
-        if !is_attached[new as usize] && stands[old as usize] && !hangs {
-            others.entry(mover(new)).or_default().push(old);
-        }
-    }
-    let members = |first: u32| match constraints.bodies.number_at(first) {
-        Some(body) => constraints.bodies.as_slice()[body].members.clone(),
-        None => vec![first],
-    };
-    let of_mover = |(first, standing)| Attached { followers: members(first), standing };
-    attached.extend(others.into_iter().map(of_mover));
-    attached
-}
-
-impl Attached {
-    /// Moves the followers as the standing vertices move, by the rigid motion nearest to theirs;
-    /// `displacements` are those of all vertices, CRS units.
-    fn follow(&self, map: &Map, displacements: &mut [[f64; 2]]) {
-        let body = Body::new(map, self.standing.clone());
-        let [x, y] = body.scale;
-        let in_m = |&v: &u32| [displacements[v as usize][0] * x, displacements[v as usize][1] * y];
-        let of_standing: Vec<[f64; 2]> = self.standing.iter().map(in_m).collect();
-        let Motion { shift_m, turn } = body.nearest_motion(&of_standing);
-        let (from, origin) = (map.at(self.standing[0]), body.arms_m[0]);
-        let arm = |&v: &u32| {
-            let at = map.at(v);
-            [origin[0] + (at[0] - from[0]) * x, origin[1] + (at[1] - from[1]) * y]
-        };
-        let arms_m: Vec<[f64; 2]> = self.followers.iter().map(arm).collect();
-        // A turn that near vertices show must not carry far ones away.
-        let longest = |vectors: &[[f64; 2]]| vectors.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-        let most = longest(&of_standing) / longest(&arms_m).max(f64::MIN_POSITIVE);
-        let motion = Motion { shift_m, turn: turn.clamp(-most, most) };
-        let followers = Body { members: self.followers.clone(), arms_m, scale: body.scale };
-        for (&v, [dx, dy]) in self.followers.iter().zip(followers.displacements_m(&motion)) {
-            displacements[v as usize] = [dx / x, dy / y];
-        }
-    }
-}
-
-impl OwnPart {
-    /// Cuts the vertices out of a map, with the segments and polygons among them.
-    fn new(map: &Map, is_own: &[bool]) -> Self {
-        let indices: Vec<u32> = (0..is_own.len() as u32).filter(|&v| is_own[v as usize]).collect();
-        let position = |v: u32| indices.binary_search(&v).ok().map(|position| position as u32);
-        let coords = indices.iter().map(|&v| map.at(v)).collect();
-        let vertices = VertexTable::new(coords).expect("they are vertices of a map");
-        let segments = map.segments.iter().filter_map(|&[a, b]| Some([position(a)?, position(b)?])).collect();
-        let mut firsts: BTreeMap<u32, u32> = BTreeMap::new();
-        let root = |(own, &v): (u32, &u32)| {
-            map.polygon_roots.get(v as usize).map_or(own, |&root| *firsts.entry(root).or_insert(own))
-        };
-        let polygon_roots = (0..).zip(&indices).map(root).collect();
-        OwnPart { indices, vertices, segments, polygon_roots }
-    }
 }

@@ -7,9 +7,8 @@ use meshmark_core::{
     deformation::Prediction,
     embedding::{self, Marked},
     estimation::Estimates,
-    fingerprint::{
-        self, Fingerprint, FingerprintEmbedding, PilotsAlone, check_score, pilots, recipient_signs,
-    },
+    fingerprint::{self, Fingerprint, PilotsAlone, check_score, pilots, recipient_signs},
+    fingerprint_embedding::{self, FingerprintEmbedding},
     ground::Ground,
     key::SecretKey,
     map::Map,
@@ -54,7 +53,7 @@ fn embed(
     parameters: &Parameters,
 ) -> Result<Marked, Error> {
     let series = Series::of_one(*map, parameters);
-    fingerprint::embed(&series, key, recipient, coefficients).map(|(marked, _)| marked)
+    fingerprint_embedding::embed(&series, key, recipient, coefficients).map(|(marked, _)| marked)
 }
 
 fn estimates(map: &Map, observed: &[Option<[f64; 2]>], parameters: &Parameters) -> Estimates {
@@ -110,7 +109,7 @@ fn recipients_marked_together_get_the_copies_of_recipients_marked_alone() {
     let names = ["ACME", "Öster AB"];
     let all = names.map(|name| embedding.fingerprint(name));
     let wanted = embedding.wanted(&all, &|_| ()).unwrap();
-    for ((name, fingerprint), wanted) in names.iter().zip(&all).zip(&wanted) {
+    for ((name, fingerprint), wanted) in names.iter().zip(&all).zip(wanted) {
         let together = embedding.settle(fingerprint, wanted).unwrap();
         assert_eq!(together, embed(&map, &key, name, COEFFICIENTS, &parameters).unwrap());
     }

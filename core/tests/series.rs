@@ -4,7 +4,8 @@ use meshmark_core::{
     agreement::Evidence,
     deformation::Prediction,
     estimation::Estimates,
-    fingerprint::{self, FingerprintEmbedding, recipient_signs},
+    fingerprint::recipient_signs,
+    fingerprint_embedding::{self, FingerprintEmbedding},
     ground::Ground,
     key::SecretKey,
     map::Map,
@@ -113,13 +114,17 @@ fn series<'a>(editions: &'a [MapData], parameters: &'a Parameters) -> Series<'a>
         map: on(data),
         bases: (0..number).collect(),
         anchors: &[],
+        part_size: None,
     };
     Series::new(editions.iter().enumerate().map(edition).collect(), parameters).unwrap()
 }
 
 fn copy(editions: &[MapData], recipient: &str) -> Vec<[f64; 2]> {
     let parameters = parameters();
-    fingerprint::embed(&series(editions, &parameters), &key(), recipient, COEFFICIENTS).unwrap().0.coords
+    fingerprint_embedding::embed(&series(editions, &parameters), &key(), recipient, COEFFICIENTS)
+        .unwrap()
+        .0
+        .coords
 }
 
 fn places(vertices: &VertexTable, coords: &[[f64; 2]]) -> BTreeMap<[u64; 2], [f64; 2]> {

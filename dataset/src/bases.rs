@@ -32,7 +32,7 @@ pub fn read_bases<E: From<Error> + From<meshmark_marking::Error>>(
     let Some(named) = &options.bases else {
         return match options.base_references {
             Some(_) => Err(Error::NoBase.into()),
-            None => Ok(Bases::of_anchors(anchors)),
+            None => Ok(Bases::of_one(anchors, options.parts_of(map.data.vertices.len()))),
         };
     };
     let mut entries: Vec<BaseEntry> = Vec::new();
@@ -54,7 +54,7 @@ pub fn read_bases<E: From<Error> + From<meshmark_marking::Error>>(
     }
     let references = options.base_references.as_ref().ok_or(Error::NoBaseReference)?;
     let references: Vec<PathBuf> = references.iter().map(PathBuf::from).collect();
-    let bases = Bases::find((entries, anchors), &references, read)?;
+    let bases = Bases::find((entries, anchors), None, &references, read)?;
     match bases.have_any_of(map) {
         true => Ok(bases),
         false => Err(Error::OtherBase { base: join_list(named) }.into()),
@@ -120,8 +120,7 @@ fn check_record(
         return Err(Error::BaseOfOtherMark { base: base(), option, made_with, given });
     }
     let whole = &record.reference.vertices_sha256;
-    let is_whole = record.bases.is_empty() && record.anchors.is_empty();
-    if is_whole && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
+    if record.is_whole() && !record.parts.iter().all(|part| part.sha256.to_string() == *whole) {
         return Err(Error::BaseOfOtherParts { base: base() });
     }
     match options.coefficients == recorded.coefficients {

@@ -2,7 +2,8 @@
 
 use meshmark_core::{
     agreement::Evidence,
-    fingerprint::{COEFFICIENTS, Fingerprint, FingerprintEmbedding, pilots, recipient_signs},
+    fingerprint::{COEFFICIENTS, Fingerprint, pilots, recipient_signs},
+    fingerprint_embedding::{FingerprintEmbedding, Wanted},
     ground::Ground,
     key::SecretKey,
     map_data::{ChainKind, MapData},
@@ -50,11 +51,11 @@ static TOWN: LazyLock<Town> = LazyLock::new(|| {
     let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let marks: Vec<_> = (0..COPIES).map(|k| embedding.fingerprint(&name(k))).collect();
     let wanted = embedding.wanted(&marks, &|_| ()).unwrap();
-    let copy = |(mark, wanted): (_, &Vec<[f64; 2]>)| {
+    let copy = |(mark, wanted): (_, Wanted)| {
         let coords = embedding.settle(mark, wanted).unwrap().coords;
         indices.iter().map(|&vertex| coords[vertex as usize]).collect()
     };
-    let copies = marks.iter().zip(&wanted).map(copy).collect();
+    let copies = marks.iter().zip(wanted).map(copy).collect();
     let part = embedding.parts().clone();
     Town { data, key, part, corners, copies }
 });

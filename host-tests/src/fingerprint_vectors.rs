@@ -7,7 +7,8 @@ use meshmark_core::{
     deformation::Prediction,
     embedding::Marked,
     estimation::Estimates,
-    fingerprint::{COEFFICIENTS, FingerprintEmbedding, pilots, recipient_signs},
+    fingerprint::{COEFFICIENTS, pilots, recipient_signs},
+    fingerprint_embedding::FingerprintEmbedding,
     fingerprint_record::FingerprintRecord,
     options::{Options, Parameters},
     patches::Patches,
@@ -44,12 +45,15 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
     let series = Series::of_one(on_ground, parameters);
     let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).expect("it fits");
     let fingerprint = embedding.fingerprint(RECIPIENT);
-    let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| ()).expect("it converges");
-    let marked = embedding.settle(&fingerprint, &wanted[0]).expect("it is read back");
+    let mut wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| ()).expect("it converges");
+    let wanted = wanted.pop().expect("one for each fingerprint");
+    let divided = embedding.divided(&wanted);
+    let first_wanted = wanted.displacements()[..FIRST].to_vec();
+    let marked = embedding.settle(&fingerprint, wanted).expect("it is read back");
     let geometries = map.geometries.as_ref().expect("they were requested");
     let distortion = Unmarked::new(geometries, &on_ground, &GeosOfGdal).distortion(&marked, parameters);
     let reference = marking::reference(&map.data.vertices, map.crs(), marked.patches);
-    let lineage = Lineage { parts: embedding.part_entries(), ..Lineage::default() };
+    let lineage = Lineage { divided, ..Lineage::default() };
     let record = marking::fingerprint_record(
         &options,
         RECIPIENT,
@@ -75,7 +79,7 @@ pub fn steps_and_record() -> (Value, FingerprintRecord) {
             "patch_0_fingerprint": signs(&fingerprint),
         },
         "3_marked": {
-            "first_wanted": wanted[0][..FIRST],
+            "first_wanted": first_wanted,
             "first": marked.coords[..FIRST],
             "rms_m": marked.displacement.rms_m,
             "max_m": marked.displacement.max_m,

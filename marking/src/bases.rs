@@ -4,21 +4,23 @@
 use crate::{Crs, Error, Lineage, Result, Survey};
 use meshmark_core::{
     anchors::Anchors,
-    fingerprint_record::{BaseEntry, PartEntry},
+    fingerprint_record::{BaseEntry, Divided},
     ground::Ground,
     map::Map,
     map_data::MapData,
     options::Parameters,
-    series::{Census, Edition, Series},
+    series::{Edition, Series},
 };
 
 /// Reads a reference as its entry describes it; returns nothing for a map without these layers.
 pub type ReadBase<'a, R, C, E> = dyn FnMut(&R, &BaseEntry) -> std::result::Result<Option<Survey<C>>, E> + 'a;
 
-/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors.
+/// The earlier editions from which vertices of a map stand, the oldest first, and its anchors; or the
+/// size of the parts into which it is cut.
 #[derive(Default)]
 pub struct Bases {
     anchors: Anchors,
+    part_size: Option<usize>,
     entries: Vec<BaseEntry>,
     references: Vec<BaseMap>,
 }
@@ -31,18 +33,19 @@ struct BaseMap {
 }
 
 impl Bases {
-    /// Creates the bases of a map that has anchors alone.
-    pub fn of_anchors(anchors: Anchors) -> Self {
-        Bases { anchors, ..Bases::default() }
+    /// Creates the bases of a map that has anchors alone, or is cut into parts of this size.
+    pub fn of_one(anchors: Anchors, part_size: Option<usize>) -> Self {
+        Bases { anchors, part_size, ..Bases::default() }
     }
 
-    /// Finds the reference of every entry among these files, for a map with these anchors; `read`
-    /// returns nothing for a file that lacks the layers of the entry.
+    /// Finds the reference of every entry among these files, for a map with these anchors or this size
+    /// of parts; `read` returns nothing for a file that lacks the layers of the entry.
     ///
     /// # Errors
     /// Fails on an entry without a reference, and on the errors of `read`.
     pub fn find<R, C: Crs, E: From<Error>>(
         (entries, anchors): (Vec<BaseEntry>, Anchors),
+        part_size: Option<usize>,
         files: &[R],
         read: &mut ReadBase<'_, R, C, E>,
     ) -> std::result::Result<Self, E> {
@@ -75,7 +78,7 @@ impl Bases {
             Ok::<BaseMap, Error>(BaseMap { data: survey.data, ground })
         };
         let references = found.into_iter().flatten().map(of_survey).collect::<Result<_>>()?;
-        Ok(Bases { anchors, entries, references })
+        Ok(Bases { anchors, part_size, entries, references })
     }
 
     /// Returns whether a vertex of the map is in the reference of a base.
@@ -86,14 +89,14 @@ impl Bases {
         map.data.vertices.coords().iter().any(is_there)
     }
 
-    /// Returns whether there are neither bases nor anchors, so that the map is one part.
+    /// Returns whether there are no bases, so that a map alone has all vertices.
     pub fn are_none(&self) -> bool {
-        self.entries.is_empty() && self.anchors.is_empty()
+        self.entries.is_empty()
     }
 
     /// Returns what a record says about the bases, the anchors, and the parts that follow from them.
-    pub fn lineage(&self, parts: Vec<PartEntry>, census: Option<Census>) -> Lineage {
-        Lineage { parts, bases: self.entries.clone(), anchors: self.anchors.clone(), census }
+    pub fn lineage(&self, divided: Divided) -> Lineage {
+        Lineage { divided, bases: self.entries.clone(), anchors: self.anchors.clone() }
     }
 
     /// Returns the series of the bases and a map that rests on them.
@@ -112,12 +115,14 @@ impl Bases {
             map: data.on(ground, ground),
             bases: entry.bases.iter().map(number).collect(),
             anchors: entry.anchors.as_slice(),
+            part_size: entry.part_size,
         };
         let mut editions: Vec<Edition> = self.entries.iter().zip(&self.references).map(edition).collect();
         editions.push(Edition {
             map,
             bases: (0..self.entries.len()).collect(),
             anchors: self.anchors.as_slice(),
+            part_size: self.part_size,
         });
         Series::new(editions, parameters)
     }

@@ -8,7 +8,7 @@ use meshmark_core::{
     anchors::Anchors,
     embedding::Marked,
     fingerprint_record::{
-        self, BaseEntry, CopyEntry, FingerprintRecord, FingerprintShape, PartEntry, ReferenceEntry,
+        self, BaseEntry, CopyEntry, Divided, FingerprintRecord, FingerprintShape, ReferenceEntry,
     },
     ground::Ground,
     key::SecretKey,
@@ -16,7 +16,6 @@ use meshmark_core::{
     options::{Options, Parameters, Subject},
     record::{self, Distortion, Record, Reference, TopologyEntry},
     recorded::Recorded,
-    series::Census,
     vertices::VertexTable,
 };
 use std::borrow::Cow;
@@ -90,13 +89,11 @@ fn outlines<'a>(
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Lineage {
     /// The parts of the map and its bases; none of a message.
-    pub parts: Vec<PartEntry>,
+    pub divided: Divided,
     /// The bases.
     pub bases: Vec<BaseEntry>,
     /// The vertices that stay in place.
     pub anchors: Anchors,
-    /// How the vertices are divided, where they are not all free.
-    pub census: Option<Census>,
 }
 
 /// Returns the record of a marking, a fingerprint or a message as the options have it.
@@ -161,13 +158,14 @@ pub fn fingerprint_record(
     distortion: Distortion,
 ) -> FingerprintRecord {
     let (Reference { vertices, vertices_sha256, crs, .. }, lineage) = (reference, lineage);
-    let Lineage { parts, bases, anchors, census } = lineage;
+    let Lineage { divided: Divided { parts, census }, bases, anchors } = lineage;
+    let part_size = options.parts_of(vertices);
     FingerprintRecord {
         meshmark_record: fingerprint_record::VERSION,
         software: SOFTWARE.into(),
         key_commitment: key.commitment(),
         recipient: recipient.into(),
-        mark: FingerprintShape::new(coefficients, &options.parameters),
+        mark: FingerprintShape::new(coefficients, &options.parameters, part_size),
         layers: options.layers.clone(),
         srs: options.srs.clone(),
         reference: ReferenceEntry { vertices, vertices_sha256, file_sha256: None, crs },

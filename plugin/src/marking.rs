@@ -10,7 +10,8 @@ use meshmark_core::{
     carrier::Carrier,
     demodulation,
     embedding::{self, Marked},
-    fingerprint::{self, FingerprintEmbedding},
+    fingerprint,
+    fingerprint_embedding::{self, FingerprintEmbedding},
     fingerprint_record::BaseEntry,
     key::{SecretKey, read_text},
     map::Map,
@@ -99,8 +100,8 @@ impl MarkingRequest {
         match (coefficients, subject) {
             (Some(coefficients), Subject::Recipient(recipient)) => {
                 let series = bases.series(map, parameters)?;
-                let (marked, parts) = fingerprint::embed(&series, key, recipient, *coefficients)?;
-                Ok((marked, bases.lineage(parts, series.census())))
+                let (marked, divided) = fingerprint_embedding::embed(&series, key, recipient, *coefficients)?;
+                Ok((marked, bases.lineage(divided)))
             }
             _ => Ok((embedding::embed(&map, key, &subject.carried(key), parameters)?, Lineage::default())),
         }

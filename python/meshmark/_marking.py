@@ -45,7 +45,7 @@ def mark(
         ``bar = tqdm(); mark(..., progress=lambda done, all: (bar.reset(all), bar.update(done)))``.
     **options
         ``amplitude`` (metres RMS), ``tolerance`` (metres), ``precision`` (CRS units), ``patch_size``,
-        ``shape``, ``basis``, and for messages ``code`` and ``chip_rate``, as the driver has them.
+        ``part_size``, ``shape``, ``basis``, and for messages ``code`` and ``chip_rate``, as the driver has them.
 
     Returns
     -------

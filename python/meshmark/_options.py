@@ -6,6 +6,7 @@ OPTIONS = (
     "basis",
     "chip_rate",
     "code",
+    "part_size",
     "patch_size",
     "precision",
     "shape",

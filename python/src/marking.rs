@@ -11,12 +11,12 @@ use crate::{
 };
 use meshmark_core::{
     embedding::{Embedding, Marked},
-    fingerprint::FingerprintEmbedding,
-    fingerprint_record::PartEntry,
+    fingerprint_embedding::FingerprintEmbedding,
+    fingerprint_record::Divided,
     key::SecretKey,
     map::Map,
     options::{Options, Spelling, Subject},
-    series::Series,
+    series::{Edition, Series},
 };
 use meshmark_marking::{self as marking, Lineage, Moves, Survey, Unmarked, damage_warning};
 use pyo3::{prelude::*, types::PyBytes};
@@ -86,21 +86,21 @@ fn marked(
     let on_ground = map.map(parameters)?;
     marking::check_extent(&on_ground, parameters)?;
     marking::check_scale(&on_ground, map.crs())?;
-    let (marked, parts) = embed(on_ground, key, options, job)?;
+    let marked = embed(on_ground, key, options, job)?;
     let geometries = map.geometries.as_ref().expect("the map was read with them");
     let unmarked = Unmarked::new(geometries, &on_ground, geos);
     let described = (&map.data.vertices, map.crs());
     let (mut copies, mut warnings) = (Vec::new(), Vec::new());
-    for (marked, options) in marked.iter().zip(options) {
+    for ((marked, divided), options) in marked.into_iter().zip(options) {
         let subject = subject_of(options);
-        let distortion = unmarked.distortion(marked, parameters);
+        let distortion = unmarked.distortion(&marked, parameters);
         if copies.is_empty() {
             let message = options.coefficients.is_none().then(|| subject.carried(key));
             warnings = marking::warnings(options, message.as_ref(), described, marked.patches, spelling);
             warnings.extend(damage_warning(parameters, &marked.angles, Some(&distortion.areas), spelling));
         }
         let reference = marking::reference(described.0, described.1, marked.patches);
-        let lineage = Lineage { parts: parts.clone(), ..Lineage::default() };
+        let lineage = Lineage { divided, ..Lineage::default() };
         let record = marking::recorded(options, subject, key, (reference, lineage), distortion);
         let moves = Moves { from: &map.data.vertices, to: &marked.coords };
         let moved = layers.iter().map(|layer| layer.moved(&moves)).collect::<marking::Result<_>>()?;
@@ -119,22 +119,27 @@ fn embed(
     key: &SecretKey,
     options: &[Options],
     job: &Job,
-) -> meshmark_core::Result<(Vec<Marked>, Vec<PartEntry>)> {
+) -> meshmark_core::Result<Vec<(Marked, Divided)>> {
     let (parameters, subjects) = (&options[0].parameters, options.iter().map(subject_of));
     if let Some(coefficients) = options[0].coefficients {
-        let series = Series::of_one(map, parameters);
+        let part_size = options[0].parts_of(map.vertices.len());
+        let edition = Edition { map, bases: Vec::new(), anchors: &[], part_size };
+        let series = Series::new(vec![edition], parameters)?;
         let embedding = FingerprintEmbedding::new(&series, key, coefficients)?;
         job.start(embedding.patches());
         let recipients = subjects.map(|subject| subject.recipient().expect("a fingerprint has one"));
         let fingerprints: Vec<_> = recipients.map(|recipient| embedding.fingerprint(recipient)).collect();
         let wanted = embedding.wanted(&fingerprints, &|_| job.step())?;
-        let settled = fingerprints.iter().zip(&wanted).map(|(own, wanted)| embedding.settle(own, wanted));
-        return Ok((settled.collect::<Result<_, _>>()?, embedding.part_entries()));
+        let settle = |(own, wanted)| {
+            let divided = embedding.divided(&wanted);
+            Ok((embedding.settle(own, wanted)?, divided))
+        };
+        return fingerprints.iter().zip(wanted).map(settle).collect();
     }
     let messages: Vec<_> = subjects.map(|subject| subject.carried(key)).collect();
     let embedding = Embedding::new(&map, key, messages[0].len(), parameters)?;
     job.start(embedding.patches());
     let wanted = embedding.wanted(&messages, &|_| job.step())?;
-    let settled = messages.iter().zip(&wanted).map(|(own, wanted)| embedding.settle(own, wanted));
-    Ok((settled.collect::<Result<_, _>>()?, Vec::new()))
+    let settle = |(own, wanted): (_, &Vec<_>)| Ok((embedding.settle(own, wanted)?, Divided::default()));
+    messages.iter().zip(&wanted).map(settle).collect()
 }

@@ -73,6 +73,9 @@ class LikeTheDriver(Folder):
     def test_a_town_with_options(self):
         self.check(FIXTURES / "kotka.gpkg", RECIPIENT="Ä & Co", AMPLITUDE=0.2, SHAPE="FREE", PRECISION=0.01)
 
+    def test_a_town_in_parts(self):
+        self.check(FIXTURES / "helsinki.gpkg", RECIPIENT="ACME GmbH", PART_SIZE=1920)
+
     def test_a_message(self):
         self.check(FIXTURES / "kotka.gpkg", MESSAGE="00112233445566778899aabbccddeeff")
 

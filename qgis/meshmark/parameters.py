@@ -30,6 +30,7 @@ def labels():
         "CODE": tr("Code"),
         "CHIP_RATE": tr("Chip rate"),
         "PATCH_SIZE": tr("Patch size, vertices"),
+        "PART_SIZE": tr("Part size, vertices"),
         "ATTRIBUTES": tr("Unmarked coordinates in attributes"),
         "SRS": tr("CRS where none is set"),
         "OVERWRITE": tr("Replace the file"),

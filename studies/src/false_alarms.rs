@@ -136,6 +136,7 @@ pub(crate) fn examine(
         subject: None,
         sought,
         lineage: Default::default(),
+        part_size: 0,
         tried: 1,
         parameters,
         layers: None,

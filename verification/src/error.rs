@@ -94,8 +94,8 @@ impl Error {
                 counted(*parts, "part")
             ),
             Error::OtherPartsOfBases { parts } => format!(
-                "the {} of the record are not those of its reference, its bases and its anchors: give the files of all \
-                 editions, unchanged, or verify with the version of meshmark that wrote it",
+                "the {} of the record are not those of its reference with its bases, anchors and size of parts: give the files \
+                 of all editions and the record, unchanged, or verify with the version of meshmark that wrote it",
                 counted(*parts, "part")
             ),
             Error::OtherMessage => {

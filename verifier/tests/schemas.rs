@@ -160,6 +160,7 @@ fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
     signed["signature"] = json!({ "ed25519": "00" });
     assert_valid("record-2", &signed);
     assert!(FingerprintRecord::from_json(&signed.to_string()).is_ok());
+    let whole = record.clone();
     let mut record = record;
     let first = json!({ "vertices_sha256": "ab".repeat(32), "layers": null, "srs": null, "bases": [] });
     let mut second = first.clone();
@@ -197,6 +198,16 @@ fn the_record_of_a_fingerprint_is_valid_and_its_schema_says_what_is_read() {
         let changed = with(&record, pointer, value.clone()).to_string();
         assert!(FingerprintRecord::from_json(&changed).is_err(), "{pointer} = {value} is read");
     }
+    let with_parts = |record: &Value, pointer: &str, part_size: u32| {
+        let mut changed = record.clone();
+        changed.pointer_mut(pointer).unwrap()["part_size"] = json!(part_size);
+        assert_eq!(errors("record-2", &changed).is_empty(), part_size > 0);
+        FingerprintRecord::from_json(&changed.to_string())
+    };
+    assert!(with_parts(&whole, "/mark", 90_000).is_ok() && with_parts(&record, "/bases/0", 90_000).is_ok());
+    assert!(with_parts(&whole, "/mark", 0).is_err() && with_parts(&record, "/bases/0", 0).is_err());
+    let beside = with_parts(&record, "/mark", 90_000).unwrap_err().to_string();
+    assert!(beside.contains("cuts into parts a map that rests on others"), "{beside}");
 }
 
 /// What `--report` writes, run in the fixtures.

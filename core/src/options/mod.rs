@@ -16,10 +16,11 @@ pub use parameters::{AmplitudeOf, Code, Laplacian, Parameters, Rigidity};
 pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
 pub use subject::Subject;
 pub use table::{
-    CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
+    CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PART_SIZE, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
 };
 
 use crate::{Error, Result, message::Message, signs::COEFFICIENTS};
+use table::LEAST_PATCHES_OF_PART;
 use values::Values;
 
 /// All options of one marking, parsed.
@@ -49,6 +50,8 @@ pub struct Options {
     pub base_references: Option<Vec<String>>,
     /// Path of the plan of the sheets of which the map is one.
     pub sheets: Option<String>,
+    /// A map of more vertices is cut into parts of nearly so many; 0 leaves it in one part.
+    pub part_size: usize,
 }
 
 impl Options {
@@ -78,6 +81,7 @@ impl Options {
         if let Some(option) = of_fingerprint.filter(|_| is_message) {
             return Err(Error::OfMessage { option });
         }
+        let part_size = part_size(&values, is_message)?;
         Ok(Options {
             key_path: values.text("KEY")?,
             subject,
@@ -100,6 +104,7 @@ impl Options {
             bases: values.list("BASE")?,
             base_references: values.list("BASE_REFERENCE")?,
             sheets: values.text("SHEETS")?,
+            part_size,
         })
     }
 
@@ -128,6 +133,7 @@ impl Options {
             "CODE" => is_message.then(|| p.code.name()),
             "CHIP_RATE" => is_message.then(|| p.chip_rate.to_string()),
             "PATCH_SIZE" => Some(p.patch_size.to_string()),
+            "PART_SIZE" => Some(self.part_size.to_string()),
             "TOLERANCE" => Some(p.tolerance_m.to_string()),
             "PRECISION" => p.precision_crs_units.map(|precision| precision.to_string()),
             "LAYERS" => self.layers.as_ref().map(join_list),
@@ -141,6 +147,12 @@ impl Options {
             "SHEETS" => self.sheets.clone(),
             _ => panic!("{option} is no option"),
         }
+    }
+
+    /// Returns the size of the parts into which a map of so many vertices is cut; `None` where it is one
+    /// part.
+    pub fn parts_of(&self, vertices: usize) -> Option<usize> {
+        (1..vertices).contains(&self.part_size).then_some(self.part_size)
     }
 
     /// Checks values that do not come from [`Options::parse`].
@@ -157,6 +169,25 @@ impl Parameters {
     /// Returns the parameters of a fingerprint.
     pub fn of_fingerprint() -> Self {
         Options::parse_for_recipients([]).expect("the defaults are legal").parameters
+    }
+}
+
+/// Returns the value of PART_SIZE, or its default.
+fn part_size(values: &Values, is_message: bool) -> Result<usize> {
+    let others = ["BASE", "SHEETS"].into_iter().find(|name| values.given(name).is_some());
+    let part_size = match values.integer("PART_SIZE")? {
+        Some(part_size) => part_size,
+        None if is_message || others.is_some() => 0,
+        None => PART_SIZE,
+    };
+    let patch_size = values.integer("PATCH_SIZE")?.expect("has a default");
+    let least = LEAST_PATCHES_OF_PART * patch_size;
+    match others {
+        _ if part_size == 0 => Ok(0),
+        _ if is_message => Err(Error::OfMessage { option: "PART_SIZE" }),
+        Some(option) => Err(Error::PartsBeside { option }),
+        None if part_size < least => Err(Error::SmallParts { part_size, least }),
+        None => Ok(part_size),
     }
 }
 
@@ -243,6 +274,7 @@ mod tests {
             ("CODE", "Repetition"),
             ("CHIP_RATE", "+7"),
             ("PATCH_SIZE", "0016"),
+            ("PART_SIZE", "0"),
             ("TOLERANCE", "1e-7"),
             ("PRECISION", "5e-324"),
             ("LAYERS", r#" "a ""b"", c" ,d"#),
@@ -273,6 +305,27 @@ mod tests {
             let printed = OPTIONS.iter().filter(|o| marking(&given).text_of(o.name).is_some()).count();
             assert_eq!(printed, given.len(), "all that were given");
         }
+    }
+
+    #[test]
+    fn large_maps_of_fingerprints_are_cut_unless_they_rest_on_others_or_fit_them() {
+        let parts = |pairs: &[_], vertices| Options::parse(pairs.iter().copied()).unwrap().parts_of(vertices);
+        let (recipient, of_part) = (("RECIPIENT", "ACME"), ("PART_SIZE", "90000"));
+        assert!(spec("PART_SIZE").unwrap().help.contains(&format!("by default {PART_SIZE},")));
+        assert_eq!(parts(&[recipient], PART_SIZE), None);
+        assert_eq!(parts(&[recipient], PART_SIZE + 1), Some(PART_SIZE));
+        assert_eq!(parts(&[recipient, of_part], 90_000), None);
+        assert_eq!(parts(&[recipient, of_part], 90_001), Some(90_000));
+        assert_eq!(parts(&[recipient, ("PART_SIZE", "0")], usize::MAX), None);
+        for other in [("BASE", "a.json"), ("SHEETS", "plan.json")] {
+            assert_eq!(parts(&[recipient, other], usize::MAX), None);
+            let both = error(&[recipient, other, of_part]);
+            assert!(both.contains(&format!("PART_SIZE and {} are both given", other.0)), "{both}");
+        }
+        assert_eq!(parts(&[("MESSAGE", "00")], usize::MAX), None);
+        assert!(error(&[("MESSAGE", "00"), of_part]).contains("PART_SIZE is for fingerprints"));
+        let small = error(&[recipient, ("PART_SIZE", "1919")]);
+        assert!(small.contains("use at least 1920, or 0 for one part"), "{small}");
     }
 
     #[test]

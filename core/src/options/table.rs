@@ -6,6 +6,14 @@ use super::parameters::{Code, Laplacian, Rigidity};
 /// minutes and gigabytes for each solution.
 pub const PATCH_SIZE_RANGE: (usize, usize) = (16, 4096);
 
+/// PART_SIZE where it is not given: the memory of a marking then grows with a part instead of the map.
+pub const PART_SIZE: usize = 2_000_000;
+/// The largest PART_SIZE.
+const PART_SIZE_MOST: usize = 1_000_000_000;
+/// A part has at least so many times PATCH_SIZE vertices: what stays in place at its borders must leave
+/// room for patches.
+pub(super) const LEAST_PATCHES_OF_PART: usize = 4;
+
 /// The length of the message of a RECIPIENT.
 pub const RECIPIENT_BITS: usize = 128;
 
@@ -141,6 +149,14 @@ pub const OPTIONS: &[OptionSpec] = &[
         Some("480"),
         true,
         "Smallest number of vertices in a patch",
+    ),
+    row(
+        "PART_SIZE",
+        Kind::Integer(0, PART_SIZE_MOST),
+        None,
+        true,
+        "A map of more vertices is cut into parts of nearly so many, each with a mesh of its own, solved one after the \
+         other; 0 for one part; for fingerprints alone; by default 2000000, and 0 with BASE or SHEETS",
     ),
     row(
         "TOLERANCE",

@@ -31,10 +31,9 @@ fn check_fingerprint(record: &FingerprintRecord, key: &SecretKey) -> Result<()> 
     if !record.is_of(key) {
         return Err(Error::OtherCommitment { given: key.id() });
     }
-    // Without bases and anchors, all vertices of the map are in one part; with them, the examination
-    // checks it.
+    // The examination checks the parts of other maps.
     match record.parts.as_slice() {
-        _ if !record.bases.is_empty() || !record.anchors.is_empty() => Ok(()),
+        _ if !record.is_whole() => Ok(()),
         [part] if part.sha256.to_string() == record.reference.vertices_sha256 => Ok(()),
         parts => Err(Error::OtherParts { parts: parts.len() }),
     }

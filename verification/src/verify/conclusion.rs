@@ -248,7 +248,11 @@ fn report_parameters(request: &Request, seen: &Examination, verdict: Verdict) ->
             subject.map(|subject| subject.message(&request.settings.key).to_hex()),
         ),
         Sought::Fingerprint { coefficients, .. } => {
-            (MarkParameters::Fingerprint(FingerprintShape::new(*coefficients, &request.parameters)), None)
+            // Maps that rest on others or fit them are not cut, so that the reference has all vertices.
+            let is_cut = (1..seen.vertices.reference).contains(&request.part_size);
+            let part_size = is_cut.then_some(request.part_size);
+            let shape = FingerprintShape::new(*coefficients, &request.parameters, part_size);
+            (MarkParameters::Fingerprint(shape), None)
         }
     };
     let noise_m = match seen.found.as_ref().ok() {

@@ -104,9 +104,9 @@ pub fn examine<M: Maps>(
         Ok(compared) => compared,
         Err(error) => return Ok(unfit(error)), // this comes before the search for the map
     };
-    if !bases.are_none() && !has_parts(&compared, &request.lineage.parts) {
-        let parts = request.lineage.parts.len();
-        return Ok(Suited::No(Error::OtherPartsOfBases { parts }.into()));
+    let recorded = &request.lineage.divided.parts;
+    if !recorded.is_empty() && !has_parts(&compared, recorded) {
+        return Ok(Suited::No(Error::OtherPartsOfBases { parts: recorded.len() }.into()));
     }
     let registered = register(request, (reference, &compared), suspect, stages);
     let Registered { map: suspect, registration } = registered.map_err(|error| maps.of_suspect(error))?;

@@ -38,6 +38,7 @@ pub fn requests(
             settings: settings.clone(),
             sought: sought(&options, key, *demodulator, tried)?,
             lineage: record.map(|read| lineage_of(&read.record)).unwrap_or_default(),
+            part_size: options.part_size,
             tried,
             subject: options.subject,
             record: record.cloned(),
@@ -50,22 +51,25 @@ pub fn requests(
 }
 
 /// Returns the options of the marks that given ones may mean: CODE, CHIP_RATE, MESSAGE and the demodulator
-/// of the paper mean a message, and all others either a fingerprint or a message.
+/// of the paper mean a message, PART_SIZE means a fingerprint, and all others either.
 fn possible_options(options: &[(&str, &str)], demodulator: Demodulator) -> Result<Vec<Options>> {
     let given = Options::parse(options.iter().copied())?;
-    let is_of_message = options.iter().any(|(name, _)| ["CODE", "CHIP_RATE", "MESSAGE"].contains(name));
-    if is_of_message {
+    let names = |names: &[&str]| options.iter().any(|(name, _)| names.contains(name));
+    if names(&["CODE", "CHIP_RATE", "MESSAGE"]) {
         return Ok(vec![given]);
+    }
+    let fingerprint = match given.coefficients {
+        Some(_) => given.clone(),
+        None => Options::parse_for_recipients(options.iter().copied())?,
+    };
+    if names(&["PART_SIZE"]) {
+        return Ok(vec![fingerprint]);
     }
     let code = given.parameters.code.name();
     let message = Options::parse(options.iter().copied().chain([("CODE", code.as_str())]))?;
     if demodulator == Demodulator::Paper {
         return Ok(vec![message]);
     }
-    let fingerprint = match given.coefficients {
-        Some(_) => given,
-        None => Options::parse_for_recipients(options.iter().copied())?,
-    };
     Ok(vec![fingerprint, message])
 }
 
@@ -88,8 +92,13 @@ fn sought(options: &Options, key: &SecretKey, demodulator: Demodulator, tried: u
 /// Checks that options agree with the record, which they may repeat.
 fn check_options(options: &[(&str, &str)], record: &Recorded) -> Result<()> {
     let recorded = record.options()?;
+    let vertices = record.vertices().0;
     for (name, value) in options {
         let alone = Options::parse([(*name, *value)])?;
+        // A smaller map is not cut, and its record does not say at what size it would have been.
+        if *name == "PART_SIZE" && alone.parts_of(vertices) == recorded.parts_of(vertices) {
+            continue;
+        }
         let on_record = match (*name, record) {
             // A record of a message has that of its recipient, too.
             ("MESSAGE", Recorded::Message(record)) => Some(record.message()?.to_hex()),

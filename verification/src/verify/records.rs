@@ -165,7 +165,8 @@ impl Group {
 fn groups(settings: &Settings, candidates: Vec<Candidate>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for candidate in candidates {
-        let (sought, Options { parameters, layers, srs, .. }) = (candidate.sought(), &candidate.options);
+        let (sought, part_size) = (candidate.sought(), candidate.options.part_size);
+        let Options { parameters, layers, srs, .. } = &candidate.options;
         let lineage = lineage_of(&candidate.read.record);
         let same = |group: &&mut Group| {
             let r = &group.request;
@@ -174,6 +175,7 @@ fn groups(settings: &Settings, candidates: Vec<Candidate>) -> Vec<Group> {
                 && r.srs == *srs
                 && r.sought.is_like(&sought)
                 && r.lineage == lineage
+                && r.part_size == part_size
         };
         if let Some(group) = groups.iter_mut().find(same) {
             group.candidates.push(candidate);
@@ -185,6 +187,7 @@ fn groups(settings: &Settings, candidates: Vec<Candidate>) -> Vec<Group> {
             subject: None,
             sought,
             lineage,
+            part_size,
             tried: 1,
             parameters: parameters.clone(),
             layers: layers.clone(),

@@ -63,10 +63,11 @@ pub fn read_own_reference<M: Maps>(
 /// Fails when a reference is unreadable.
 pub fn read_bases<M: Maps>(maps: &mut M, request: &Request) -> IfSuited<Bases, M::Error> {
     let Lineage { bases, anchors, .. } = request.lineage.clone();
+    let part_size = Some(request.part_size).filter(|part_size| *part_size > 0);
     let references: Vec<usize> = (0..maps.references()).collect();
     let mut read =
         |reference: &usize, entry: &BaseEntry| maps.base(*reference, entry).map_err(NoBases::Unread);
-    match Bases::find((bases, anchors), &references, &mut read) {
+    match Bases::find((bases, anchors), part_size, &references, &mut read) {
         Ok(bases) => Ok(Suited::Yes(bases)),
         Err(NoBases::Lost(error)) => Ok(Suited::No(error.into())),
         Err(NoBases::Unread(error)) => Err(error),

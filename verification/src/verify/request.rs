@@ -1,7 +1,7 @@
 //! The request of a verification.
 
 use meshmark_core::{
-    fingerprint_record::FingerprintRecord,
+    fingerprint_record::{Divided, FingerprintRecord},
     hex,
     key::SecretKey,
     options::{Parameters, Subject},
@@ -100,9 +100,11 @@ pub struct Request {
     pub subject: Option<Subject>,
     /// What the mark carries.
     pub sought: Sought,
-    /// The parts of the fingerprint, the editions that it rests on and its anchors, from a record that
-    /// names some.
+    /// The parts of the fingerprint, the editions that it rests on and its anchors, from a record of a map
+    /// that is not one part.
     pub lineage: Lineage,
+    /// A reference of more vertices is cut into parts of nearly so many; 0 leaves it in one part.
+    pub part_size: usize,
     /// Number of the marks that are tried, this one included, as nobody recorded which it is.
     pub tried: usize,
     /// The parameters of the mark.
@@ -113,12 +115,12 @@ pub struct Request {
     pub srs: Option<String>,
 }
 
-/// Returns the lineage of a record that rests on earlier editions or has anchors.
+/// Returns the lineage of a record of a map that is not one part.
 pub fn lineage_of(record: &Recorded) -> Lineage {
     match record {
-        Recorded::Fingerprint(record) if !record.bases.is_empty() || !record.anchors.is_empty() => {
+        Recorded::Fingerprint(record) if !record.is_whole() => {
             let FingerprintRecord { parts, bases, anchors, census, .. } = record.clone();
-            Lineage { parts, bases, anchors, census }
+            Lineage { divided: Divided { parts, census }, bases, anchors }
         }
         _ => Lineage::default(),
     }

@@ -4,7 +4,7 @@ use super::opening::open;
 use crate::{Error, Result};
 use gdal::vector::LayerAccess;
 use meshmark_core::{
-    fingerprint_record::FingerprintRecord,
+    fingerprint_record::{Divided, FingerprintRecord},
     key::SecretKey,
     message::Message,
     options::{Options, Subject},
@@ -99,7 +99,8 @@ impl MarkedCopy {
         let (patches, lineage, distortion) = match &found {
             Recorded::Message(record) => (record.reference.patches, Lineage::default(), record.distortion()),
             Recorded::Fingerprint(record) => {
-                (0, bases.lineage(record.parts.clone(), record.census), record.distortion)
+                let divided = Divided { parts: record.parts.clone(), census: record.census };
+                (0, bases.lineage(divided), record.distortion)
             }
         };
         let reference = (Reference { patches, ..reference.clone() }, lineage);

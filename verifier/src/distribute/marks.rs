@@ -4,8 +4,9 @@ use super::copies::MarkedCopy;
 use meshmark_core::{
     Result,
     embedding::{Embedding, Marked},
-    fingerprint::{Fingerprint, FingerprintEmbedding},
-    fingerprint_record::PartEntry,
+    fingerprint::Fingerprint,
+    fingerprint_embedding::{self, FingerprintEmbedding},
+    fingerprint_record::Divided,
     key::{RECIPIENT_BITS, SecretKey},
     map::Map,
     message::Message,
@@ -19,6 +20,14 @@ pub enum Marks<'a> {
     Messages(Box<Embedding<'a>>, &'a SecretKey),
     /// Of copies with fingerprints.
     Fingerprints(FingerprintEmbedding<'a>),
+}
+
+/// The mark of a copy before the topology of the map is settled.
+pub enum Wanted {
+    /// The displacements of all vertices, CRS units.
+    Message(Vec<[f64; 2]>),
+    /// What a fingerprint makes of the parts.
+    Fingerprint(fingerprint_embedding::Wanted),
 }
 
 impl<'a> Marks<'a> {
@@ -49,11 +58,11 @@ impl<'a> Marks<'a> {
         }
     }
 
-    /// Returns the parts of fingerprints for records.
-    pub fn part_entries(&self) -> Vec<PartEntry> {
-        match self {
-            Marks::Messages(..) => Vec::new(),
-            Marks::Fingerprints(embedding) => embedding.part_entries(),
+    /// Returns how the map is divided, for the record of a fingerprint.
+    pub fn divided(&self, wanted: &Wanted) -> Divided {
+        match (self, wanted) {
+            (Marks::Fingerprints(embedding), Wanted::Fingerprint(wanted)) => embedding.divided(wanted),
+            _ => Divided::default(),
         }
     }
 
@@ -65,32 +74,33 @@ impl<'a> Marks<'a> {
         }
     }
 
-    /// Returns the displacements that are the marks of the copies, of all vertices, CRS units.
-    pub fn wanted(
-        &self,
-        copies: &[MarkedCopy],
-        progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Vec<Vec<[f64; 2]>>> {
+    /// Returns the marks of the copies.
+    pub fn wanted(&self, copies: &[MarkedCopy], progress: &(dyn Fn(usize) + Sync)) -> Result<Vec<Wanted>> {
         match self {
             Marks::Messages(embedding, key) => {
                 let messages: Vec<Message> = copies.iter().map(|copy| copy.carried(key)).collect();
-                embedding.wanted(&messages, progress)
+                let wanted = embedding.wanted(&messages, progress)?;
+                Ok(wanted.into_iter().map(Wanted::Message).collect())
             }
             Marks::Fingerprints(embedding) => {
                 let of_copy = |copy: &MarkedCopy| embedding.fingerprint(&copy.recipient);
                 let fingerprints: Vec<Fingerprint> = copies.iter().map(of_copy).collect();
-                embedding.wanted(&fingerprints, progress)
+                let wanted = embedding.wanted(&fingerprints, progress)?;
+                Ok(wanted.into_iter().map(Wanted::Fingerprint).collect())
             }
         }
     }
 
     /// Marks the map for a copy, whose mark is read back.
-    pub fn settle(&self, copy: &MarkedCopy, wanted: &[[f64; 2]]) -> Result<Marked> {
-        match self {
-            Marks::Messages(embedding, key) => embedding.settle(&copy.carried(key), wanted),
-            Marks::Fingerprints(embedding) => {
+    pub fn settle(&self, copy: &MarkedCopy, wanted: Wanted) -> Result<Marked> {
+        match (self, wanted) {
+            (Marks::Messages(embedding, key), Wanted::Message(wanted)) => {
+                embedding.settle(&copy.carried(key), &wanted)
+            }
+            (Marks::Fingerprints(embedding), Wanted::Fingerprint(wanted)) => {
                 embedding.settle(&embedding.fingerprint(&copy.recipient), wanted)
             }
+            _ => unreachable!("a mark is settled by what wanted it"),
         }
     }
 }

@@ -124,8 +124,7 @@ fn run(
     let described = (&survey.data.vertices, survey.crs());
     let warnings = marking::warnings(options, message.as_ref(), described, marks.patches(), Spelling::Flag);
     warnings.iter().for_each(|text| warn(text));
-    let lineage = bases.lineage(marks.part_entries(), series.census());
-    let reference = (marking::reference(&survey.data.vertices, survey.crs(), marks.patches()), lineage);
+    let reference = marking::reference(&survey.data.vertices, survey.crs(), marks.patches());
     let geometries = survey.geometries.as_ref().expect("the map was read with them");
     let unmarked = pool.install(|| Unmarked::new(geometries, &map, &GeosOfGdal));
     let vertices = &survey.data.vertices;
@@ -143,11 +142,11 @@ fn run(
         let write_next = || {
             let next = todo.lock().expect("nobody panics with it").next();
             next.map(|(copy, wanted)| {
-                let marked = pool.install(|| marks.settle(copy, &wanted)).map_err(Error::from);
-                drop(wanted);
+                let lineage = bases.lineage(marks.divided(&wanted));
+                let marked = pool.install(|| marks.settle(copy, wanted)).map_err(Error::from);
                 let written = marked.and_then(|marked| {
                     let distortion = pool.install(|| job.unmarked.distortion(&marked, parameters));
-                    writing::write(&job, copy, &marked.coords, distortion)
+                    writing::write(&job, copy, &marked.coords, (lineage, distortion))
                 });
                 written.map(|()| step(1)).map_err(|error| Error::Copy {
                     recipient: copy.recipient.clone(),

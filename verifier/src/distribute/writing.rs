@@ -30,7 +30,7 @@ pub struct Job<'a> {
     pub vertices: &'a VertexTable,
     pub unmarked: Unmarked<'a>,
     /// What records say of the map.
-    pub reference: (Reference, Lineage),
+    pub reference: Reference,
     /// The digest of the map, where it is one file.
     pub map_sha256: Option<String>,
     pub format: &'static Format,
@@ -41,7 +41,12 @@ pub struct Job<'a> {
 }
 
 /// Writes, checks and publishes a copy and its record.
-pub fn write(job: &Job, copy: &MarkedCopy, moved: &[[f64; 2]], distortion: Distortion) -> Result<()> {
+pub fn write(
+    job: &Job,
+    copy: &MarkedCopy,
+    moved: &[[f64; 2]],
+    (lineage, distortion): (Lineage, Distortion),
+) -> Result<()> {
     let workplace = Workplace::new(job.folder)?;
     let folder = workplace.subfolder("out")?;
     let file = folder.join(copy.file.file_name().expect("a copy has a name"));
@@ -57,7 +62,7 @@ pub fn write(job: &Job, copy: &MarkedCopy, moved: &[[f64; 2]], distortion: Disto
     let (parameters, areas) = (&job.options.parameters, Some(&distortion.areas));
     let damage = damage_warning(parameters, &distortion.angles, areas, Spelling::Flag);
     job.warnings.lock().expect("nobody panics with them").extend(damage);
-    let reference = job.reference.clone();
+    let reference = (job.reference.clone(), lineage);
     let record = marking::recorded(job.options, &copy.subject(), job.key, reference, distortion);
     let record = with_digests(record, job, &folder)?;
     publish(copy, &workplace, &folder, &record.to_json(), job.format)
