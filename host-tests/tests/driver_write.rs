@@ -337,3 +337,20 @@ fn what_is_missing_or_collides_is_named() {
     fs::write(host.path("record.json"), "of another copy").unwrap();
     refuse(&[], &["record.json", "exists"]);
 }
+
+#[test]
+fn ogr2ogr_shows_the_progress_of_the_marking_where_it_is_asked_to() {
+    let host = Host::new();
+    // A bar is "0...10...20" to "100 - done.", or on a terminal of later versions a line that is redrawn.
+    let bars = |run: Run| {
+        let Run { stdout, stderr, .. } = run.succeeds();
+        assert!(stderr.is_empty(), "{stderr}");
+        stdout.matches("done").count()
+    };
+    let map = &source("helsinki.gpkg");
+    assert_eq!(bars(host.mark("GPKG", "quiet.gpkg", map, &[])), 0);
+    assert_eq!(bars(host.mark("GPKG", "read.gpkg", map, &["-progress"])), 2, "of patches, then of features");
+    assert_eq!(bars(host.create("written.gpkg", map, &["-progress"])), 2, "of features, then of patches");
+    let quiet = contents::read(&host.path("quiet.gpkg"));
+    assert!(["read.gpkg", "written.gpkg"].iter().all(|file| contents::read(&host.path(file)) == quiet));
+}

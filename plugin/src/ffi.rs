@@ -80,6 +80,7 @@ unsafe extern "C" fn meshmark_open(
             let opened = OwnedSource::open(&name, asks_for_native_data(&options))?;
             let marking = mark(name.clone(), &request, &opened.dataset(), None)?;
             marking.write_record(&request)?;
+            request.progress.end();
             *source = opened.into_handle();
             Ok(marking)
         });
@@ -102,6 +103,7 @@ unsafe extern "C" fn meshmark_mark(source: GDALDatasetH, options: OptionList) ->
         let marking = request(&options).and_then(|request| {
             let marking = mark(name.clone(), &request, &source, None)?;
             marking.write_record(&request)?;
+            request.progress.end();
             Ok(marking)
         });
         hand_over(&name, marking)

@@ -2,16 +2,18 @@
 
 use crate::{
     error::{Error, Result},
-    ffi_errors, output, record_file,
+    ffi_errors, output,
+    progress::Bar,
+    record_file,
     source_files::SourceFiles,
 };
 use gdal::Dataset;
 use meshmark_core::{
     carrier::Carrier,
     demodulation,
-    embedding::{self, Marked},
+    embedding::{Embedding, Marked},
     fingerprint,
-    fingerprint_embedding::{self, FingerprintEmbedding},
+    fingerprint_embedding::FingerprintEmbedding,
     fingerprint_record::BaseEntry,
     key::{SecretKey, read_text},
     map::Map,
@@ -31,6 +33,7 @@ use meshmark_marking::{
 use std::{
     fs::File,
     path::{Path, PathBuf},
+    slice,
 };
 
 /// The noise that the estimates from a file that was read back assume, metres.
@@ -60,6 +63,8 @@ pub struct MarkingRequest {
     key_path: String,
     /// The warning about a key file that others can read.
     exposed: Option<String>,
+    /// The progress of the marking.
+    pub progress: Bar,
 }
 
 impl MarkingRequest {
@@ -81,7 +86,7 @@ impl MarkingRequest {
         for (option, paths) in inputs(&options) {
             output::check_is_not_input(option, paths)?;
         }
-        Ok(MarkingRequest { options, subject, key, key_path, exposed })
+        Ok(MarkingRequest { options, subject, key, key_path, exposed, progress: Bar::wanted() })
     }
 
     /// Renames the chosen layers to the names under which they are staged; layers without such a
@@ -96,15 +101,23 @@ impl MarkingRequest {
 
     /// Marks a map on its bases; returns the lineage of a fingerprint, too.
     fn embed(&self, map: Map, bases: &Bases) -> meshmark_core::Result<(Marked, Lineage)> {
-        let MarkingRequest { options: Options { parameters, coefficients, .. }, subject, key, .. } = self;
-        match (coefficients, subject) {
-            (Some(coefficients), Subject::Recipient(recipient)) => {
-                let series = bases.series(map, parameters)?;
-                let (marked, divided) = fingerprint_embedding::embed(&series, key, recipient, *coefficients)?;
-                Ok((marked, bases.lineage(divided)))
-            }
-            _ => Ok((embedding::embed(&map, key, &subject.carried(key), parameters)?, Lineage::default())),
+        let MarkingRequest { options, subject, key, progress, .. } = self;
+        let Options { parameters, coefficients, .. } = options;
+        if let (Some(coefficients), Subject::Recipient(recipient)) = (coefficients, subject) {
+            let series = bases.series(map, parameters)?;
+            let embedding = FingerprintEmbedding::new(&series, key, *coefficients)?;
+            let fingerprint = embedding.fingerprint(recipient);
+            progress.begin(embedding.patches());
+            let wanted = embedding.wanted(slice::from_ref(&fingerprint), &|_| progress.step())?;
+            let wanted = wanted.into_iter().next().expect("one for each fingerprint");
+            let divided = embedding.divided(&wanted);
+            return Ok((embedding.settle(&fingerprint, wanted)?, bases.lineage(divided)));
         }
+        let message = subject.carried(key);
+        let embedding = Embedding::new(&map, key, message.len(), parameters)?;
+        progress.begin(embedding.patches());
+        let wanted = embedding.wanted(slice::from_ref(&message), &|_| progress.step())?;
+        Ok((embedding.settle(&message, &wanted[0])?, Lineage::default()))
     }
 
     /// Returns the path of the record.
@@ -260,7 +273,7 @@ impl Marking {
     ///
     /// For a message [`demodulation::paper`] suffices: every vertex is found and none is deformed, so there are
     /// no erasures for [`demodulation::joint`] to leave out, and the noise that it would weigh, the
-    /// rounding to the digits of the format, has no estimate here. [`embedding`] has an estimate of
+    /// rounding to the digits of the format, has no estimate here. [`Embedding`] has an estimate of
     /// its own noise and uses `joint`. The two checks stay different, as a change of the
     /// demodulator would change which outputs are refused.
     pub fn check_mark(

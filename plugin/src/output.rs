@@ -46,13 +46,21 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
+/// Returns what follows the name of the program on the command line of this process, if it is an
+/// ogr2ogr.
+pub fn ogr2ogr_arguments() -> Option<Vec<String>> {
+    of_ogr2ogr(&arguments()).map(<[String]>::to_vec)
+}
+
+fn of_ogr2ogr(arguments: &[String]) -> Option<&[String]> {
+    let (program, rest) = arguments.split_first()?;
+    (Path::new(program).file_name()? == "ogr2ogr").then_some(rest)
+}
+
 /// Returns the target of ogr2ogr, if `is_accepted` accepts it. The target precedes the source;
 /// options and their values stand before and between them.
 fn target(arguments: &[String], is_accepted: impl Fn(&Path) -> bool) -> Option<&str> {
-    let (program, rest) = arguments.split_first()?;
-    if Path::new(program).file_name()? != "ogr2ogr" {
-        return None;
-    }
+    let rest = of_ogr2ogr(arguments)?;
     let source = rest.iter().position(marked_view::is_named_by)?;
     let is_input = |at: usize| at > 0 && INPUT_OPTIONS.contains(&rest[at - 1].as_str());
     let named = (0..source).find(|&at| !is_input(at) && is_accepted(Path::new(&rest[at])))?;

@@ -176,6 +176,7 @@ impl Writer {
         drop((view, schema));
         let record = record.map(|record| with_digests(record, &places, &folder)).transpose()?;
         publish(&target, &places, &folder, record.map(|record| record.to_json()).as_deref())?;
+        request.progress.end();
         Ok(warnings)
     }
 

@@ -184,10 +184,16 @@ def export(source, output, options, feedback):
         raise QgsProcessingException("\n".join(errors))
 
 
+# The share of an export in which ogr2ogr hands the features to the driver.
+HANDING_OVER = 0.1
+
+
 def percent(text):
-    """Returns the progress that ogr2ogr prints: "0...10...20"."""
-    numbers = re.findall(r"\d+", text)
-    return float(numbers[-1]) if numbers else 0.0
+    """Returns the progress that ogr2ogr prints: "0...10...20", first that of features, then of the marking."""
+    of_features, is_over, of_marking = text.partition("done")
+    numbers = re.findall(r"\d+", of_marking if is_over else of_features)
+    done = float(numbers[-1]) if numbers else 0.0
+    return 100 * HANDING_OVER + (1 - HANDING_OVER) * done if is_over else HANDING_OVER * done
 
 
 def check_places(output, folder, overwrite):
