@@ -2,15 +2,21 @@
 
 import numbers
 
+import numpy
+
 
 def values_of(column):
-    """Return the texts of a column: of strings, integers and truth values; None for all others."""
-    column = list(column)
-    # Pandas keeps integers as floats where some are missing.
-    are_integers = any(_is_missing(value) for value in column) and all(
-        _is_missing(value) or isinstance(value, numbers.Real) and value == int(value) for value in column if _is_finite(value)
-    )
-    return [_text(value, are_integers) for value in column]
+    """Return the texts of strings, integers and truth values; None for all other values."""
+    return [_text(value) for value in column]
+
+
+def values_of_series(series):
+    """Return the texts of a series of pandas, which keeps integers as floats where some are missing."""
+    if series.dtype.kind == "f" and series.hasnans:
+        there = series.dropna()
+        if (there % 1 == 0).all() and (there.abs() < 2**63).all():
+            series = series.astype("Int64")
+    return values_of(series.to_numpy(dtype=object, na_value=None))
 
 
 def texts_of(columns, count, wanted=None):
@@ -21,19 +27,7 @@ def texts_of(columns, count, wanted=None):
     return [[text for text in row if text is not None] for row in rows]
 
 
-def _text(value, are_integers):
+def _text(value):
     if isinstance(value, str):
         return value
-    if isinstance(value, numbers.Integral) or type(value).__name__ == "bool_":
-        return str(int(value))
-    if are_integers and isinstance(value, numbers.Real) and _is_finite(value):
-        return str(int(value))
-    return None
-
-
-def _is_missing(value):
-    return value is None or value != value or type(value).__name__ in ("NAType", "NaTType")
-
-
-def _is_finite(value):
-    return isinstance(value, numbers.Real) and value == value and abs(value) != float("inf")
+    return str(int(value)) if isinstance(value, (numbers.Integral, numpy.bool_)) else None

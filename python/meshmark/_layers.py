@@ -3,7 +3,7 @@
 import numpy
 import shapely
 
-from ._attributes import texts_of, values_of
+from ._attributes import texts_of, values_of_series
 from ._crs import Crs
 
 
@@ -44,7 +44,7 @@ class Frame:
         """Return names and values of the other columns."""
         others = [number for number, name in enumerate(self.frame.columns) if name not in self.names]
         columns = {str(self.frame.columns[number]): self.frame.iloc[:, number] for number in others}
-        return {name: values_of(column.to_numpy(dtype=object, na_value=None)) for name, column in columns.items()}
+        return {name: values_of_series(column) for name, column in columns.items()}
 
     def moved(self, geometries):
         """Return a copy with these geometries, those of each column."""
