@@ -18,11 +18,13 @@ if ldd "$out"/clean/lib/python*/site-packages/meshmark/_meshmark*.so | grep -E '
     echo "the wheel needs a library that a user may lack" >&2
     exit 1
 fi
-cd python
-"../$out/clean/bin/python" -m unittest discover -s tests
-"../$out/clean/bin/python" -c 'import doctest, sys, meshmark
+# Not from the folder of the package, which Python would import instead of the wheel.
+root=$PWD
+cd "$out/clean"
+bin/python -m unittest discover -s "$root/python/tests"
+bin/python -c 'import doctest, sys, meshmark
 from meshmark import _comparison, _distribution, _verification
 modules = (meshmark, _comparison, _distribution, _verification)
 sys.exit(any(doctest.testmod(module).failed for module in modules))'
-cd ..
+cd "$root"
 ls -l "$out"/wheels
