@@ -41,7 +41,8 @@ fn mark(data: &MapData, part_size: usize) -> Result<(Marked, Divided), Error> {
     fingerprint_embedding::embed(&in_parts(data, part_size, &parameters), &key(), "ACME", COEFFICIENTS)
 }
 
-/// A town with lines from one end to the other, and a hole whose ring is far inside its polygon.
+/// A town with lines from one end to the other, kerbs six centimetres apart, and a hole whose ring is far
+/// inside its polygon.
 fn town_with_long_lines(seed: usize) -> Vec<Feature> {
     let size = 20.0 * SIDE as f64;
     let line = |points: &[[f64; 2]]| Feature { points: points.to_vec(), kind: ChainKind::Line };
@@ -49,6 +50,12 @@ fn town_with_long_lines(seed: usize) -> Vec<Feature> {
     let shift = (seed % 13) as f64;
     features.push(line(&[[-9.0, 17.5 + shift], [size + 9.0, 33.0 + shift]]));
     features.push(line(&[[11.5, -7.0], [0.7 * size, size + 3.0]]));
+    for (row, by) in (0..SIDE).flat_map(|row| [(row, 0.0), (row, 6.0)]) {
+        let (at, steps) = (20.0 * row as f64 - 1.5 + by / 100.0, size as usize / 13);
+        let kerb = (0..steps).map(|i| [13.0 * i as f64 + by, at]);
+        features.push(line(&kerb.clone().collect::<Vec<_>>()));
+        features.push(line(&kerb.map(|[along, across]| [across, along]).collect::<Vec<_>>()));
+    }
     let outer = [[-20.0, -20.0], [size + 20.0, -20.0], [size + 20.0, size + 20.0], [-20.0, size + 20.0]];
     let hole = [[-15.0, -15.0], [size + 15.0, -15.0], [size + 15.0, size + 15.0], [-15.0, size + 15.0]];
     features.push(Feature { points: outer.to_vec(), kind: ChainKind::Shell });
