@@ -67,9 +67,9 @@ fn a_copy_in_parts_names_its_recipient_and_nothing_new_crosses() {
     fs::copy(host.path("copy.json"), host.path("records/parts.json")).unwrap();
     mark(&host, "whole.gpkg", "map.gpkg", &["RECORD=records/whole.json"]).succeeds();
     assert!(json(&host, "records/whole.json")["mark"].get("part_size").is_none());
-    for copy in ["copy.gpkg", "whole.gpkg"] {
-        let report = host.matches("map.gpkg", &["--records", "records", copy]);
-        assert_eq!(report["candidates"]["list"].as_array().unwrap().len(), 2, "{report:#}");
+    for (copy, record) in [("copy.gpkg", "parts.json"), ("whole.gpkg", "whole.json")] {
+        let candidates = &host.matches("map.gpkg", &["--records", "records", copy])["candidates"];
+        assert_eq!((&candidates["tried"], &candidates["list"][0]["record"]), (&json!(2), &json!(record)));
     }
 }
 
