@@ -3,7 +3,9 @@
 //! The method is that of R. Ohbuchi, H. Ueda and S. Endoh, *Watermarking 2D Vector Maps in the
 //! Mesh-Spectral Domain*, Shape Modeling International 2003 ("the paper"). Each step has a module,
 //! in the order of the data flow: [`vertices`] → [`mesh`] → [`patches`] → [`spectrum`] → [`code`] →
-//! [`carrier`] → [`embedding`], and back through [`demodulation`].
+//! [`carrier`] → [`embedding`], and back through [`demodulation`]. What a recipient gets is a
+//! [`fingerprint`]: [`fingerprint_embedding`] marks the parts of a map, which [`series`] finds, and
+//! [`estimation`] and [`agreement`] read it.
 //!
 //! ```
 //! use meshmark_core::{

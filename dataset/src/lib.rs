@@ -1,6 +1,6 @@
-//! GDAL datasets as vertices, and marked maps as files. Only this crate walks layers and
-//! geometries, so that the driver and the verifier see the same map; it also holds what both need
-//! to write one: formats, reading back, publication.
+//! GDAL datasets as vertices, and marked maps as files. Only this crate walks the layers of GDAL's
+//! datasets (their geometries are walked by `meshmark-marking`), so that the driver and the verifier
+//! see the same map; it also holds what both need to write one: formats, reading back, publication.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -1,6 +1,6 @@
 //! The module `meshmark._meshmark`, on which the Python package `meshmark` rests: layers as lists of
-//! well-known binary in, marked layers and a record out, or a report. The package brings the CRS of pyproj and the
-//! GEOS of shapely.
+//! well-known binary in; marked layers and a record out, or a report, or a comparison. The package
+//! brings the CRS of pyproj and the GEOS of shapely; there is no GDAL.
 #![deny(unsafe_code)]
 
 mod comparison;
