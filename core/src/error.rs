@@ -181,7 +181,8 @@ impl Error {
                 name("PATCH_SIZE")
             ),
             Error::TooFewInParts { vertices, patch_size } => format!(
-                "of the parts into which the {vertices} vertices are cut, none has enough away from its borders for {}: use a                  larger {}, or 0 for one part",
+                "of the parts into which the {vertices} vertices are cut, none has enough away from its borders for {}: use \
+                 a larger {}, or 0 for one part",
                 spelling.value("PATCH_SIZE", patch_size),
                 name("PART_SIZE")
             ),

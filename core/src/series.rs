@@ -146,6 +146,12 @@ impl<'a> Series<'a> {
         }
     }
 
+    /// Returns the names of the parts into which an edition is cut; `None` where it is not.
+    pub fn cut_parts(&self, edition: usize) -> Option<Vec<PartDigest>> {
+        let boxes = self.boxes(edition)?;
+        Some((0..boxes.len()).map(|number| boxes.digest(number)).collect())
+    }
+
     /// Returns what `make` makes of the part of an edition, which is not in boxes, if it has one. New
     /// vertices are none where they are too few, on one line, or have no room for the coefficients.
     pub(crate) fn part<'s, T>(

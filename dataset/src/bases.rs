@@ -35,7 +35,7 @@ pub fn read_bases<E: From<Error> + From<meshmark_marking::Error>>(
             None => Ok(Bases::of_one(anchors, options.parts_of(map.data.vertices.len()))),
         };
     };
-    let mut entries: Vec<BaseEntry> = Vec::new();
+    let (mut entries, mut cut): (Vec<BaseEntry>, Vec<(PathBuf, FingerprintRecord)>) = Default::default();
     let own_digest = map.data.vertices.digest();
     for path in records_at(named)? {
         let record = read_record(&path)?;
@@ -51,10 +51,20 @@ pub fn read_bases<E: From<Error> + From<meshmark_marking::Error>>(
                 Some(_) => return Err(Error::ContradictingBase { base: path }.into()),
             }
         }
+        if record.mark.part_size.is_some() {
+            cut.push((path, record));
+        }
     }
     let references = options.base_references.as_ref().ok_or(Error::NoBaseReference)?;
     let references: Vec<PathBuf> = references.iter().map(PathBuf::from).collect();
     let bases = Bases::find((entries, anchors), None, &references, read)?;
+    for (base, record) in cut {
+        let found = bases.cut_parts(&record.reference.vertices_sha256, &options.parameters);
+        let found = found.map_err(meshmark_marking::Error::from)?;
+        if found.is_none_or(|found| !found.iter().eq(record.parts.iter().map(|part| &part.sha256))) {
+            return Err(Error::BaseOfOtherParts { base }.into());
+        }
+    }
     match bases.have_any_of(map) {
         true => Ok(bases),
         false => Err(Error::OtherBase { base: join_list(named) }.into()),

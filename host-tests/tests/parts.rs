@@ -140,4 +140,19 @@ fn a_part_size_that_makes_no_parts_is_refused_and_so_is_a_record_of_other_parts(
     assert!(run.code == Some(4) && run.stderr.contains("parts"), "{:?} {}", run.code, run.stderr);
     let (run, _) = host.verify("map.gpkg", &["--record", "copy.json", "--part-size", "2400", "copy.gpkg"]);
     assert!(run.code == Some(2) && run.stderr.contains("--part-size 2400"), "{}", run.stderr);
+
+    // Nothing would stand where the record says it does.
+    let whole = json(&host, "copy.json");
+    let mut fewer = whole.clone();
+    fewer["parts"].as_array_mut().unwrap().pop();
+    let mut renamed = whole;
+    renamed["parts"][1]["sha256"] = json!("0".repeat(64));
+    next(&Map::read(&host.path("map.gpkg")).unwrap(), 0.1, 3).write(&host.path("next.gpkg")).unwrap();
+    for changed in [record, fewer, renamed] {
+        fs::write(host.path("other.json"), changed.to_string()).unwrap();
+        let refused = mark(&host, "no.gpkg", "next.gpkg", &["BASE=other.json", "BASE_REFERENCE=map.gpkg"]);
+        let words = "names parts that are not those of its reference";
+        assert!(refused.code != Some(0) && refused.stderr.contains(words), "{}", refused.stderr);
+        assert!(!host.path("no.gpkg").exists());
+    }
 }

@@ -9,6 +9,7 @@ use meshmark_core::{
     map::Map,
     map_data::MapData,
     options::Parameters,
+    part::PartDigest,
     series::{Edition, Series},
 };
 
@@ -79,6 +80,28 @@ impl Bases {
         };
         let references = found.into_iter().flatten().map(of_survey).collect::<Result<_>>()?;
         Ok(Bases { anchors, part_size, entries, references })
+    }
+
+    /// Returns the names of the parts into which the base whose reference has this digest is cut; `None`
+    /// where it is not.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Series::new`].
+    pub fn cut_parts(
+        &self,
+        vertices_sha256: &str,
+        parameters: &Parameters,
+    ) -> meshmark_core::Result<Option<Vec<PartDigest>>> {
+        let mut bases = self.entries.iter().zip(&self.references);
+        let Some((entry, BaseMap { data, ground })) =
+            bases.find(|(entry, _)| entry.vertices_sha256 == vertices_sha256)
+        else {
+            return Ok(None);
+        };
+        // What is cut rests on nothing.
+        let (map, part_size) = (data.on(ground, ground), entry.part_size);
+        let edition = Edition { map, bases: Vec::new(), anchors: &[], part_size };
+        Ok(Series::new(vec![edition], parameters)?.cut_parts(0))
     }
 
     /// Returns whether a vertex of the map is in the reference of a base.

@@ -146,10 +146,13 @@ pub fn conclude_fingerprint(
     }
 }
 
-/// Returns the reason of an answer. Without a record nothing says whether a map rests on earlier editions.
+/// Returns the reason of an answer. Without a record nothing says whether a map rests on
+/// earlier editions or is cut into parts of another size.
 fn reason(request: &Request, answer: &fingerprints::Answer) -> String {
     let reservation = match answer.verdict == Verdict::NoMatch && request.record.is_none() {
-        true => ": an edition that rests on earlier ones shows with its record alone",
+        true => {
+            ": an edition that rests on earlier ones, or a large map in parts of another size, shows with its record alone"
+        }
         false => "",
     };
     answer.reason.clone() + reservation

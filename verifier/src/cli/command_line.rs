@@ -38,17 +38,19 @@ pub fn own_repeatable() -> Vec<String> {
     repeatable(std::env::args_os().skip(2).map(|word| word.to_string_lossy().into_owned()))
 }
 
-/// Returns arguments without those that only name outputs, or where a passphrase is.
+/// Returns arguments without those that only name outputs, the limits of a machine, or where a
+/// passphrase is.
 pub fn repeatable(arguments: impl Iterator<Item = String>) -> Vec<String> {
-    const WITH_VALUE: [&str; 4] = ["--report", "--evidence-map", "--bundle", "--passphrase-file"];
+    const WITH_VALUE: [&str; 6] =
+        ["--report", "--evidence-map", "--bundle", "--passphrase-file", "--memory-limit", "--time-limit"];
     let (options, files) = split(arguments.collect());
     let (mut kept, mut options) = (Vec::new(), options.into_iter());
     while let Some(word) = options.next() {
-        let is_output = |name: &&str| word.strip_prefix(*name).is_some_and(|rest| rest.starts_with('='));
+        let has_value = |name: &&str| word.strip_prefix(*name).is_some_and(|rest| rest.starts_with('='));
         match word.as_str() {
             name if WITH_VALUE.contains(&name) => drop(options.next()),
             "--json" | "--explain" => {}
-            _ if WITH_VALUE.iter().any(is_output) => {}
+            _ if WITH_VALUE.iter().any(has_value) => {}
             _ => kept.push(word),
         }
     }

@@ -10,7 +10,7 @@ pub(super) fn run(args: &RepeatArgs) -> Result<()> {
     let (path, given) = (&args.bundle, Bundle::read(&args.bundle)?);
     let manifest = given.manifest();
     if command_line::repeatable(manifest.arguments.iter().cloned()) != manifest.arguments {
-        let reason = "its command names an output or a passphrase".into();
+        let reason = "its command names an output, a passphrase or a limit".into();
         return Err(Error::NoBundle { path: path.clone(), reason });
     }
     let differ = |differences: Vec<String>| {
