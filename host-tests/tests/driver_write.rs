@@ -351,6 +351,9 @@ fn ogr2ogr_shows_the_progress_of_the_marking_where_it_is_asked_to() {
     assert_eq!(bars(host.mark("GPKG", "quiet.gpkg", map, &[])), 0);
     assert_eq!(bars(host.mark("GPKG", "read.gpkg", map, &["-progress"])), 2, "of patches, then of features");
     assert_eq!(bars(host.create("written.gpkg", map, &["-progress"])), 2, "of features, then of patches");
+    let to_stdout = ["-progress", "buildings"];
+    let written = host.mark("GeoJSON", "/vsistdout/", &source("kotka.gpkg"), &to_stdout).succeeds().stdout;
+    assert!(written.starts_with('{'), "no bar is in a map: {:?}", written.get(..60));
     let quiet = contents::read(&host.path("quiet.gpkg"));
     assert!(["read.gpkg", "written.gpkg"].iter().all(|file| contents::read(&host.path(file)) == quiet));
 }
