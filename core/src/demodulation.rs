@@ -20,7 +20,10 @@ use crate::{
     signs::decoy_sums,
     spectrum::Basis,
 };
-use faer::{Mat, linalg::solvers::Solve};
+use faer::{
+    Col, Mat, Par,
+    linalg::{solvers::Solve, triangular_inverse::invert_lower_triangular},
+};
 use rayon::prelude::*;
 
 /// Correlations with chips spread by this at least, metres.
@@ -287,9 +290,14 @@ fn joint_of(job: &Job, disturbance: &Prediction) -> Result<Demodulation> {
 pub(crate) fn posterior(mut gram: Mat<f64>, product: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let m = gram.nrows();
     (0..m).for_each(|j| gram[(j, j)] += 1.0);
-    let inverse = factor(&gram).solve(Mat::<f64>::identity(m, m));
-    let estimate = |j: usize| (0..m).map(|l| inverse[(j, l)] * product[l]).sum();
-    ((0..m).map(estimate).collect(), (0..m).map(|j| inverse[(j, j)]).collect())
+    let factor = factor(&gram);
+    let mut estimate = Col::from_fn(m, |j| product[j]);
+    factor.solve_in_place(&mut estimate);
+    // G + I = L Lᵀ, so that the diagonal of the inverse is that of L⁻ᵀ L⁻¹.
+    let mut root = Mat::zeros(m, m);
+    invert_lower_triangular(root.as_mut(), factor.L(), Par::Seq);
+    let variance = root.col_iter().map(|column| column.squared_norm_l2());
+    (estimate.iter().copied().collect(), variance.collect())
 }
 
 struct Job<'a> {

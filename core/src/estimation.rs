@@ -99,12 +99,10 @@ fn estimate(kernel: &Kernel, correlations: &[Vec<f64>; 2], amplitude_m: f64) -> 
         }
         ([(_, x), (_, y)], Some(cross)) => {
             let count = x.ncols();
-            let coupled = Mat::from_fn(2 * count, 2 * count, |i, k| match (i / count, k / count) {
-                (0, 0) => x[(i, k)],
-                (1, 1) => y[(i - count, k - count)],
-                (1, 0) => cross[(k, i - count)],
-                _ => 0.0,
-            });
+            let mut coupled = Mat::zeros(2 * count, 2 * count);
+            coupled.submatrix_mut(0, 0, count, count).copy_from(x);
+            coupled.submatrix_mut(count, count, count, count).copy_from(y);
+            coupled.submatrix_mut(count, 0, count, count).copy_from(cross.transpose());
             posterior(gram(&coupled), &[product(0), product(1)].concat())
         }
         _ => unreachable!("a kernel is that of both axes, or of either with their products"),

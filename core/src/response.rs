@@ -8,7 +8,10 @@ use crate::{
 };
 use faer::{
     Accum, Mat, Par, Scale,
-    linalg::matmul::triangular::{self, BlockStructure},
+    linalg::matmul::{
+        matmul,
+        triangular::{self, BlockStructure},
+    },
 };
 
 /// The shares of vertices in the displacement of a point: a vertex, and for the axes a and b of the
@@ -120,13 +123,12 @@ impl Response {
     /// Returns the products of all columns with all columns.
     pub fn kernel(&self) -> Kernel {
         match self {
-            Response::Separate(block) => Kernel { own: vec![(vec![0, 1], lower_gram(block))], cross: None },
+            Response::Separate(block) => {
+                Kernel { own: vec![(vec![0, 1], lower_gram(&[block]))], cross: None }
+            }
             Response::Coupled([[xx, xy], [yx, yy]]) => Kernel {
-                own: vec![
-                    (vec![0], lower_gram(xx) + lower_gram(yx)),
-                    (vec![1], lower_gram(xy) + lower_gram(yy)),
-                ],
-                cross: Some(xx.transpose() * xy + yx.transpose() * yy),
+                own: vec![(vec![0], lower_gram(&[xx, yx])), (vec![1], lower_gram(&[xy, yy]))],
+                cross: Some(products(&[(xx, xy), (yx, yy)])),
             },
         }
     }
@@ -153,9 +155,19 @@ impl Response {
         products.map(|product| product.iter().copied().collect())
     }
 
-    /// Returns the rows of some vertices.
+    /// Returns the rows of some vertices, ascending.
     pub fn rows(&self, rows: &[usize]) -> Self {
-        let of = |block: &Mat<f64>| Mat::from_fn(rows.len(), block.ncols(), |o, i| block[(rows[o], i)]);
+        let of = |block: &Mat<f64>| {
+            if rows.len() == block.nrows() {
+                return block.clone();
+            }
+            let mut kept = Mat::zeros(rows.len(), block.ncols());
+            for column in 0..block.ncols() {
+                let all = block.col_as_slice(column);
+                kept.col_as_slice_mut(column).iter_mut().zip(rows).for_each(|(to, &row)| *to = all[row]);
+            }
+            kept
+        };
         match self {
             Response::Separate(block) => Response::Separate(of(block)),
             Response::Coupled(blocks) => {
@@ -224,21 +236,32 @@ fn root(ratio: f64) -> f64 {
     if ratio.is_finite() { ratio.sqrt() } else { 1.0 }
 }
 
-/// Returns the lower triangle of XᵀX, zeros above it.
-fn lower_gram(x: &Mat<f64>) -> Mat<f64> {
-    let mut gram = Mat::zeros(x.ncols(), x.ncols());
-    triangular::matmul(
-        gram.as_mut(),
-        BlockStructure::TriangularLower,
-        Accum::Replace,
-        x.transpose(),
-        BlockStructure::Rectangular,
-        x,
-        BlockStructure::Rectangular,
-        1.0,
-        Par::Seq,
-    );
+/// Returns the lower triangle of Σ XᵀX, zeros above it.
+fn lower_gram(blocks: &[&Mat<f64>]) -> Mat<f64> {
+    let mut gram = Mat::zeros(blocks[0].ncols(), blocks[0].ncols());
+    for x in blocks {
+        triangular::matmul(
+            gram.as_mut(),
+            BlockStructure::TriangularLower,
+            Accum::Add,
+            x.transpose(),
+            BlockStructure::Rectangular,
+            x,
+            BlockStructure::Rectangular,
+            1.0,
+            Par::Seq,
+        );
+    }
     gram
+}
+
+/// Returns Σ XᵀY.
+fn products(pairs: &[(&Mat<f64>, &Mat<f64>)]) -> Mat<f64> {
+    let mut sum = Mat::zeros(pairs[0].0.ncols(), pairs[0].1.ncols());
+    for (x, y) in pairs {
+        matmul(sum.as_mut(), Accum::Add, x.transpose(), y, 1.0, Par::Seq);
+    }
+    sum
 }
 
 /// Returns the coupled response: bodies shift by the mean of their vertices and turn by

@@ -12,6 +12,10 @@ use rstar::{RTree, primitives::GeomWithData};
 /// A vertex in the plane, and its index.
 type Node = GeomWithData<[f64; 2], u32>;
 
+/// So many points within a radius are compared one by one, which is faster than a search in order of
+/// distance.
+const FEW: usize = 8;
+
 /// Finds the suspect vertex of every reference vertex within a radius.
 pub struct Matcher<'a> {
     reference: &'a [[f64; 2]],
@@ -98,12 +102,18 @@ impl<'a> Matcher<'a> {
     /// Returns the point of `tree` nearest to `from` on the ground, within `radius_m`. The smaller
     /// index wins ties.
     fn nearest(&self, tree: &RTree<Node>, from: [f64; 2], radius_m: f64) -> Option<u32> {
+        let nearer = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        let mut within = self.within(tree, from, radius_m);
+        let best = within.by_ref().take(FEW).min_by(nearer);
+        if within.next().is_none() {
+            return best.map(|(_, index)| index);
+        }
         // The nearest point of the plane bounds the distance, so that a heap of points costs nothing.
         let [mx, my] = self.ground.metres_per_unit(from);
         let (at, near) = (self.plane(from), tree.nearest_neighbor(&self.plane(from))?.geom());
         let bound_m = ((near[0] - at[0]) * mx / self.x_scale).hypot((near[1] - at[1]) * my);
         let within = self.within(tree, from, radius_m.min(bound_m * (1.0 + 1e-9)));
-        within.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, index)| index)
+        within.min_by(nearer).map(|(_, index)| index)
     }
 
     /// Returns the points of `tree` within `radius_m` of `from` on the ground, each as its distance
