@@ -96,7 +96,7 @@ faults: build
 	$(BUILD)/faults
 
 # Every fuzz target for so long, side by side: make fuzz SECONDS=600 TARGETS="key record".
-fuzz: deps
+fuzz: build
 	$(WITH_GDAL) CARGO=$(CARGO) fuzz/run.sh $(or $(SECONDS),60) $(TARGETS)
 
 # The driver under AddressSanitizer, UndefinedBehaviorSanitizer and valgrind.
@@ -165,7 +165,6 @@ uninstall:
 
 lint: deps
 	$(CARGO) fmt --all -- --check
-	$(CARGO) fmt --manifest-path fuzz/Cargo.toml -- --check
 	$(WITH_GDAL) $(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 	$(WITH_GDAL) $(CARGO) test --release --locked --test architecture
 

@@ -10,12 +10,18 @@ seconds=$1
 targets=("${@:2}")
 [ ${#targets[@]} -gt 0 ] || targets=($(cd fuzz/corpus && ls))
 cargo=${CARGO:-cargo}
-host=$(rustc -vV | sed -n 's/^host: //p')
 work=target/fuzz
-built=$work/build/$host/release
+built=$work/build/release
 
-RUSTC_WRAPPER=$PWD/fuzz/rustc.sh "$cargo" build --release --locked --manifest-path fuzz/Cargo.toml \
-    --target "$host" --target-dir "$work/build" "${targets[@]/#/--bin=}"
+# The crates of others are those of the product, so that they are compiled once.
+if [ ! -d "$built" ] && [ -d target/release/deps ]; then
+    mkdir -p "$built/deps"
+    cp -a target/release/build target/release/.fingerprint "$built/"
+    find target/release/deps -type f ! -name "*meshmark*" \( -name "*.r*" -o -name "*.d" -o -name "*.so" \) \
+        -exec cp -a -t "$built/deps" {} +
+fi
+RUSTC_WORKSPACE_WRAPPER=$PWD/fuzz/rustc.sh "$cargo" build --release --locked -p meshmark-fuzz --target-dir "$work/build" \
+    "${targets[@]/#/--bin=}"
 
 memory=/dev/shm
 [ -w "$memory" ] || memory=${TMPDIR:-/tmp}

@@ -122,10 +122,10 @@ fn unescaped(quoted: &[u8]) -> Cow<'_, [u8]> {
     decoded.map_or(plain.into(), |text| text.into_bytes().into())
 }
 
-/// Returns the numbers of a position or a bounding box, as written.
-pub fn numbers(list: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let inside = list.strip_prefix(b"[").and_then(|list| list.strip_suffix(b"]")).unwrap_or_default();
-    inside.split(|byte| *byte == b',').map(<[u8]>::trim_ascii).filter(|number| !number.is_empty())
+/// Returns the ordinates of a position or a bounding box, as written: numbers, where it is valid.
+pub fn ordinates(list: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let elements = if list.is_empty() { None } else { Text(list).elements(0..list.len()) };
+    elements.unwrap_or_default().into_iter().map(|ordinate| &list[ordinate])
 }
 
 /// A JSON text; ranges are those of values without surrounding blanks.
@@ -292,8 +292,7 @@ impl<'a> Text<'a> {
     fn has_fourth_ordinate(&self, coordinates: Range<usize>) -> Option<bool> {
         let mut places = Vec::new();
         self.positions(coordinates, 0, &mut places)?;
-        let has =
-            |place: &Place| matches!(place, Place::Position(at) if numbers(&self.0[at.clone()]).count() > 3);
+        let has = |place: &Place| matches!(place, Place::Position(at) if ordinates(&self.0[at.clone()]).count() > 3);
         Some(places.iter().any(has))
     }
 
@@ -308,7 +307,7 @@ impl<'a> Text<'a> {
                 Place::BoundingBox(_) => text.extend(b"null"),
                 Place::Position(range) => {
                     let zeroed = |(i, number)| if i < 3 { b"0".as_slice() } else { number };
-                    let ordinates: Vec<&[u8]> = numbers(&self.0[range]).enumerate().map(zeroed).collect();
+                    let ordinates: Vec<&[u8]> = ordinates(&self.0[range]).enumerate().map(zeroed).collect();
                     text.extend([b"[".as_slice(), &ordinates.join(&b','), b"]"].concat());
                 }
             }
@@ -349,6 +348,11 @@ mod tests {
                 Some(
                     r#"{"geometry":{"geometries":[{"coordinates":[0,0],"bbox":null,"a":[1,2]},{"coordinates":[]}]}}"#,
                 ),
+            ),
+            (r#"{"geometry":{"coordinates":[{"a":[1,2],"b":[3,4],"c":[]}]}}"#, Some("{}")),
+            (
+                r#"{"geometry":{"coordinates":[1,2,3,{"a":[4,5]}]}}"#,
+                Some(r#"{"geometry":{"coordinates":[0,0,0,{"a":[4,5]}]}}"#),
             ),
             (r#"{"geometry":null}"#, Some("{}")),
             (r#"{"properties":null,"x":1}"#, Some(r#"{"x":1,"properties":{}}"#)),

@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use meshmark_dataset::geojson_text::{Place, has_foreign_places, numbers, places, without_places};
+use meshmark_dataset::geojson_text::{Place, has_foreign_places, ordinates, places, without_places};
 use serde_json::{Map, Value};
 
 fuzz_target!(|bytes: &[u8]| {
@@ -12,7 +12,7 @@ fuzz_target!(|bytes: &[u8]| {
         let (Place::Position(range) | Place::BoundingBox(range)) = place;
         assert!(at <= range.start && range.start < range.end && range.end <= bytes.len());
         at = range.end;
-        numbers(&bytes[range]).for_each(drop);
+        ordinates(&bytes[range]).for_each(drop);
     }
     let kept = [false, true].map(|has_json_fields| without_places(bytes, has_json_fields));
     let has_foreign = has_foreign_places(bytes);

@@ -2,6 +2,8 @@
 //! the map, which is missing.
 #![no_main]
 
+mod file;
+
 use libfuzzer_sys::fuzz_target;
 use meshmark_core::{key::SecretKey, options::Options};
 use meshmark_verifier::{
@@ -9,26 +11,22 @@ use meshmark_verifier::{
     distribute::{DistributeRequest, distribute},
     progress::Progress,
 };
-use std::{fs, sync::OnceLock};
-use tempfile::TempDir;
 
 fuzz_target!(|bytes: &[u8]| {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| tempfile::tempdir().expect("a folder for temporary files"));
-    let list = folder.path().join("list.csv");
-    fs::write(&list, bytes).expect("a temporary file");
-    let request = DistributeRequest {
-        key: SecretKey::from_bytes([7; 32]),
-        options: Options::parse_for_recipients([]).expect("the defaults are legal"),
-        map: folder.path().join("missing.gpkg"),
-        recipients: list,
-        folder: folder.path().to_path_buf(),
-        format: "GPKG".into(),
-    };
     let mut warnings = 0;
-    let result = distribute(&request, &mut Progress::default(), &mut |warning| {
-        assert!(warning.contains(" is there again in line "), "{warning}");
-        warnings += 1;
+    let result = file::with("list.csv", bytes, |list| {
+        let request = DistributeRequest {
+            key: SecretKey::from_bytes([7; 32]),
+            options: Options::parse_for_recipients([]).expect("the defaults are legal"),
+            map: file::folder().join("missing.gpkg"),
+            recipients: list.into(),
+            folder: file::folder().into(),
+            format: "GPKG".into(),
+        };
+        distribute(&request, &mut Progress::default(), &mut |warning| {
+            assert!(warning.contains(" is there again in line "), "{warning}");
+            warnings += 1;
+        })
     });
     let error = result.err().expect("there is no map");
     let lines = bytes.iter().filter(|byte| matches!(byte, b'\n' | b'\r')).count();

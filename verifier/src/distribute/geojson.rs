@@ -4,7 +4,7 @@
 use crate::{Error, Result};
 use meshmark_dataset::{
     Action, file_error,
-    geojson_text::{Place, numbers, places},
+    geojson_text::{Place, ordinates, places},
 };
 use std::{
     fs::File,
@@ -80,7 +80,7 @@ fn is_feature(line: &[u8]) -> bool {
 /// correspond.
 fn feature(line: &[u8], marked: &[u8]) -> Option<Vec<u8>> {
     let of_place = |place| match place {
-        Place::Position(range) => Some(numbers(&marked[range]).collect()),
+        Place::Position(range) => Some(ordinates(&marked[range]).collect()),
         Place::BoundingBox(_) => None,
     };
     let positions: Vec<Vec<&[u8]>> = places(marked)?.into_iter().filter_map(of_place).collect();
@@ -90,7 +90,7 @@ fn feature(line: &[u8], marked: &[u8]) -> Option<Vec<u8>> {
         let (Place::Position(range) | Place::BoundingBox(range)) = &place;
         joined.extend(&line[at..range.start]);
         at = range.end;
-        let list: Vec<&[u8]> = numbers(&line[range.clone()]).collect();
+        let list: Vec<&[u8]> = ordinates(&line[range.clone()]).collect();
         let list = match place {
             Place::Position(_) => {
                 let position = rest.next()?;
