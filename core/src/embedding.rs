@@ -39,7 +39,8 @@ pub struct Marked {
 }
 
 impl Marked {
-    /// Describes a map that was marked, given its number of patches and of hanging vertices.
+    /// Describes a map that was marked, given its number of patches and of hanging vertices; all vertices
+    /// carry signs.
     pub(crate) fn new(map: &Map, settled: Settled, (patches, junctions): (usize, usize)) -> Self {
         Marked {
             displacement: Displacement::between(map.vertices, &settled.coords, map.measure),

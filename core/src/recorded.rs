@@ -68,6 +68,14 @@ impl Recorded {
         }
     }
 
+    /// Returns the CRS of the reference as authority and code, or as WKT; `None` where it had none.
+    pub fn crs(&self) -> Option<&str> {
+        match self {
+            Recorded::Message(record) => record.reference.crs.as_deref(),
+            Recorded::Fingerprint(record) => record.reference.crs.as_deref(),
+        }
+    }
+
     /// Returns the number of vertices of the reference, and their digest.
     pub fn vertices(&self) -> (usize, &str) {
         match self {

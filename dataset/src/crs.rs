@@ -90,6 +90,12 @@ impl TransformableCrs for CoordinateSystem {
         SpatialRef::from_epsg(code).ok().map(CoordinateSystem::new)
     }
 
+    fn parse(text: &str) -> meshmark_marking::Result<Self> {
+        let srs = SpatialRef::from_definition(text)
+            .map_err(|_| meshmark_marking::Error::UnknownSrs(text.into()))?;
+        Ok(CoordinateSystem::new(srs))
+    }
+
     fn is_same(&self, other: &CoordinateSystem) -> bool {
         self.0 == other.0 || self.horizontal().is_some_and(|own| Some(own) == other.horizontal())
     }
@@ -131,9 +137,7 @@ pub fn as_crs(crs: &Option<CoordinateSystem>) -> Option<&dyn Crs> {
 /// # Errors
 /// [`meshmark_marking::Error::UnknownSrs`].
 pub fn parse_srs(text: &str) -> Result<CoordinateSystem> {
-    let srs =
-        SpatialRef::from_definition(text).map_err(|_| meshmark_marking::Error::UnknownSrs(text.into()))?;
-    Ok(CoordinateSystem::new(srs))
+    Ok(CoordinateSystem::parse(text)?)
 }
 
 #[cfg(test)]

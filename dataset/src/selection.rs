@@ -42,6 +42,8 @@ pub struct Selection<'a> {
     pub layers: Option<&'a [String]>,
     /// CRS of a source that has none.
     pub srs: Option<&'a str>,
+    /// CRS in which a source was marked, from its record.
+    pub recorded_crs: Option<&'a str>,
     /// Attributes that become labels.
     pub labels: LabelFields<'a>,
     /// Whether to keep the geometries.
@@ -60,6 +62,7 @@ impl Default for Selection<'_> {
         Selection {
             layers: None,
             srs: None,
+            recorded_crs: None,
             labels: LabelFields::None,
             geometries: false,
             most_vertices: MOST_VERTICES,

@@ -3,7 +3,6 @@
 use crate::{
     CoordinateSystem, Error, Result,
     crs::as_crs,
-    parse_srs,
     read_geometry::read_geometry,
     selection::{LabelFields, Selection, chosen_layers},
     turns::turn,
@@ -12,7 +11,9 @@ use gdal::{
     Dataset,
     vector::{Feature, FieldValue, Layer, LayerAccess},
 };
-use meshmark_marking::{self as marking, Chains, Content, Crs, Extent, Faults, TransformableCrs};
+use meshmark_marking::{
+    self as marking, Chains, Content, Crs, CrsSource, Extent, Faults, KnownCrs, TransformableCrs,
+};
 
 /// A map that GDAL read.
 pub type Survey = marking::Survey<CoordinateSystem>;
@@ -26,8 +27,10 @@ pub type Numbers = marking::Numbers<CoordinateSystem>;
 /// Fails on a layer that does not exist or cannot be read to its end, layers of different CRS,
 /// coordinates that are not finite, and a CRS without a metric.
 pub fn survey(dataset: &Dataset, selection: &Selection) -> Result<Survey> {
-    let Walk { found, crs, .. } = Walk::over(dataset, selection, true)?;
-    Ok(found.survey(crs.and_then(|(_, crs)| crs), selection.geometries)?)
+    let Walk { found, crs, crs_source, .. } = Walk::over(dataset, selection, true)?;
+    let mut survey = found.survey(crs.and_then(|(_, crs)| crs), selection.geometries)?;
+    survey.crs_source = crs_source;
+    Ok(survey)
 }
 
 /// Reads the vertices and the labels of a dataset, whose layers may be in any CRS. Coordinates that
@@ -45,6 +48,8 @@ struct Walk<'a> {
     in_one_crs: bool,
     /// The first layer with vertices, and its CRS.
     crs: Option<(String, Option<CoordinateSystem>)>,
+    /// Where this CRS comes from.
+    crs_source: CrsSource,
     found: Content<CoordinateSystem>,
 }
 
@@ -52,7 +57,7 @@ impl<'a> Walk<'a> {
     fn over(dataset: &Dataset, selection: &'a Selection<'a>, in_one_crs: bool) -> Result<Self> {
         let keeps_areas = !matches!(selection.labels, LabelFields::None);
         let found = Content::new(keeps_areas);
-        let mut walk = Walk { selection, in_one_crs, crs: None, found };
+        let mut walk = Walk { selection, in_one_crs, crs: None, crs_source: CrsSource::Map, found };
         for (index, name) in &chosen_layers(dataset, selection.layers)? {
             let _turn = turn(dataset, name)?;
             let features = walk.layer(&mut dataset.layer(*index)?, name)?;
@@ -63,7 +68,7 @@ impl<'a> Walk<'a> {
 
     /// Reads a layer and returns its number of features.
     fn layer(&mut self, layer: &mut Layer, name: &str) -> Result<u64> {
-        let columns = self.columns(layer)?;
+        let (columns, sources): (Vec<_>, Vec<_>) = self.columns(layer)?.into_iter().unzip();
         let mut of_column = vec![Chains::default(); columns.len()];
         let mut features = 0;
         for feature in layer.features() {
@@ -92,9 +97,12 @@ impl<'a> Walk<'a> {
         if let Some(reason) = (self.selection.last_failure)() {
             return Err(Error::Unreadable { layer: name.into(), reason });
         }
-        for (crs, chains) in columns.iter().zip(&of_column) {
+        for ((crs, source), chains) in columns.iter().zip(sources).zip(&of_column) {
             if self.in_one_crs && !chains.coords.is_empty() {
                 self.check_crs(name, crs)?;
+                if self.crs_source == CrsSource::Map {
+                    self.crs_source = source;
+                }
             }
         }
         self.found.end_layer(name, columns.into_iter().zip(of_column));
@@ -123,19 +131,11 @@ impl<'a> Walk<'a> {
         self.found.describe(wanted.filter_map(|(_, value)| text(value?)).collect(), &geometry);
     }
 
-    /// Returns the CRS of every geometry column of a layer.
-    fn columns(&self, layer: &Layer) -> Result<Vec<Option<CoordinateSystem>>> {
-        let given = self.selection.srs.map(parse_srs).transpose()?;
-        let crs = |own: Option<CoordinateSystem>| match (own, &given) {
-            (Some(own), Some(given)) if !own.is_same(given) => {
-                let [crs, srs] = own.names_apart(given);
-                Err(marking::Error::ContradictingSrs { crs, srs }.into())
-            }
-            (Some(own), _) => Ok(Some(own)),
-            (None, given) => Ok(given.clone()),
-        };
-        let fields = layer.defn().geom_fields();
-        fields.map(|field| crs(field.spatial_ref().ok().and_then(CoordinateSystem::of_layer))).collect()
+    /// Returns the CRS of every geometry column of a layer, and where it comes from.
+    fn columns(&self, layer: &Layer) -> Result<Vec<(Option<CoordinateSystem>, CrsSource)>> {
+        let known = KnownCrs::parse(self.selection.srs, self.selection.recorded_crs)?;
+        let own = layer.defn().geom_fields().map(|field| field.spatial_ref().ok());
+        own.map(|own| Ok(known.of_layer(own.and_then(CoordinateSystem::of_layer))?)).collect()
     }
 
     /// Checks that the layers, which share one mesh, share one CRS.
@@ -211,7 +211,7 @@ mod tests {
         }
         assert!(survey(&dataset, &Selection::default()).is_err(), "the layers share no CRS");
         let numbers = numbers(&dataset, &Selection::default()).unwrap();
-        let map = numbers.in_crs(&parse_srs("EPSG:3857").unwrap()).unwrap();
+        let map = numbers.in_crs(&crate::parse_srs("EPSG:3857").unwrap()).unwrap();
         let [a, b] = map.data.vertices.coords() else { panic!("{:?}", map.data.vertices.coords()) };
         assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3, "{a:?} {b:?}");
         let raw = numbers.raw().unwrap();

@@ -2,6 +2,7 @@
 
 use crate::{Crs, Error, Result};
 use meshmark_core::{
+    embedding::Marked,
     ground::Ground,
     map::Map,
     message::{ADVISED_BITS, LEAST_IDENTIFYING_BITS, Message},

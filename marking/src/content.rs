@@ -1,7 +1,7 @@
 //! The content of a map in the order of reading, and the map that it becomes.
 
 use crate::{
-    Chains, Crs, Error, Extent, Geometries, LeftOut, Metric, Result, TransformableCrs, labels,
+    Chains, Crs, CrsSource, Error, Extent, Geometries, LeftOut, Metric, Result, TransformableCrs, labels,
     left_out::{MISSING, is_there},
     polylines, reproject,
     survey::Survey,
@@ -98,7 +98,7 @@ impl<C: Crs + Clone> Content<C> {
         let data = MapData { areas, labels, polylines, ..data };
         let metric = Metric::measure(crs.as_ref().map(|crs| crs as &dyn Crs), &data.vertices)?;
         let geometries = keeps_geometries.then(|| Geometries::new(indices, chains));
-        Ok(Survey { data, crs, metric, geometries, features, left_out })
+        Ok(Survey { data, crs, crs_source: CrsSource::Map, metric, geometries, features, left_out })
     }
 
     /// Returns the numbers, without labels and polylines at places that no CRS can mean.

@@ -20,6 +20,7 @@ mod extent;
 mod geometries;
 #[cfg(unix)]
 mod key_file;
+mod known_crs;
 mod labels;
 pub mod left_out;
 mod moves;
@@ -42,6 +43,7 @@ pub use extent::Extent;
 pub use geometries::{FeatureGeometry, Geometries, Outline};
 #[cfg(unix)]
 pub use key_file::exposure;
+pub use known_crs::{CrsSource, KnownCrs};
 pub use left_out::{Faults, LeftOut};
 pub use moves::{Moves, NotMoved};
 pub use records::{Lineage, Unmarked, fingerprint_record, recorded, reference};

@@ -1,6 +1,6 @@
 //! A map as it was read.
 
-use crate::{Crs, Geometries, LeftOut, Metric, Result};
+use crate::{Crs, CrsSource, Geometries, LeftOut, Metric, Result};
 use meshmark_core::{ground::Ground, map::Map, map_data::MapData, options::Parameters};
 use std::collections::BTreeMap;
 
@@ -11,6 +11,8 @@ pub struct Survey<C> {
     pub data: MapData,
     /// The CRS: the common one of the layers, or the target of a reprojection.
     pub crs: Option<C>,
+    /// Where it comes from.
+    pub crs_source: CrsSource,
     pub(crate) metric: Metric,
     /// The geometries in the order of reading, if they were requested.
     pub geometries: Option<Geometries>,

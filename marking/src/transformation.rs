@@ -16,6 +16,12 @@ pub trait TransformableCrs: Crs + Clone {
     /// Returns the CRS of this EPSG code; `None` where the library lacks it.
     fn from_epsg(code: u32) -> Option<Self>;
 
+    /// Returns the CRS of a text: a code such as "EPSG:3067", WKT or PROJ.
+    ///
+    /// # Errors
+    /// [`Error::UnknownSrs`].
+    fn parse(text: &str) -> Result<Self>;
+
     /// Returns whether both have the same x and y; heights do not matter to a map.
     fn is_same(&self, other: &Self) -> bool;
 

@@ -351,6 +351,7 @@ fn selection<'a>(options: &'a Options, last_failure: &'a dyn Fn() -> Option<Stri
     Selection {
         layers: options.layers.as_deref(),
         srs: options.srs.as_deref(),
+        recorded_crs: None,
         labels: LabelFields::None,
         geometries: options.record_path.is_some(),
         most_vertices: MOST_VERTICES,

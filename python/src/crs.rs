@@ -24,18 +24,6 @@ struct Properties {
 }
 
 impl PyCrs {
-    /// Returns the CRS of a text such as "EPSG:3067".
-    ///
-    /// # Errors
-    /// [`Error::UnknownSrs`].
-    pub fn parse(text: &str) -> marking::Result<Self> {
-        let owned = text.to_owned();
-        let parsed = call_waiting(|py| {
-            py.import("meshmark._crs")?.call_method1("parse", (owned,))?.extract::<Option<PyCrs>>()
-        });
-        parsed.ok().flatten().ok_or_else(|| Error::UnknownSrs(text.into()))
-    }
-
     /// Returns what `f` returns for the object of Python.
     fn ask<T: Send + 'static>(
         &self,
@@ -119,6 +107,14 @@ impl Crs for PyCrs {
 impl TransformableCrs for PyCrs {
     fn from_epsg(code: u32) -> Option<Self> {
         PyCrs::parse(&format!("EPSG:{code}")).ok()
+    }
+
+    fn parse(text: &str) -> marking::Result<Self> {
+        let owned = text.to_owned();
+        let parsed = call_waiting(|py| {
+            py.import("meshmark._crs")?.call_method1("parse", (owned,))?.extract::<Option<PyCrs>>()
+        });
+        parsed.ok().flatten().ok_or_else(|| Error::UnknownSrs(text.into()))
     }
 
     fn is_same(&self, other: &Self) -> bool {

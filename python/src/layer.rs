@@ -2,8 +2,8 @@
 
 use crate::crs::PyCrs;
 use meshmark_marking::{
-    self as marking, Chains, Content, Crs, Extent, Faults, Moves, NotMoved, Numbers, Outline, Survey,
-    TransformableCrs,
+    self as marking, Chains, Content, Crs, CrsSource, Extent, Faults, KnownCrs, Moves, NotMoved, Numbers,
+    Outline, Survey, TransformableCrs,
 };
 use pyo3::{prelude::*, pybacked::PyBackedBytes};
 
@@ -90,13 +90,21 @@ pub enum Besides {
     Description,
 }
 
-/// Reads layers, which share one CRS: their own, or this one where they have none.
+/// Reads layers, which share one CRS, of which this is known beside them.
 ///
 /// # Errors
 /// Fails on layers of several CRS, and on geometries that are malformed or not finite.
-pub fn survey(layers: &[&Layer], given: Option<&PyCrs>, besides: Besides) -> marking::Result<Survey<PyCrs>> {
-    let of_layer = layers.iter().map(|layer| crs_of(layer, given));
+pub fn survey(
+    layers: &[&Layer],
+    known: &KnownCrs<PyCrs>,
+    besides: Besides,
+) -> marking::Result<Survey<PyCrs>> {
+    let of_layer = layers.iter().map(|layer| known.of_layer(layer.crs.clone()));
     let of_layer = of_layer.collect::<marking::Result<Vec<_>>>()?;
+    let (of_layer, sources): (Vec<_>, Vec<_>) = of_layer.into_iter().unzip();
+    let of_filled = layers.iter().zip(sources).filter(|(layer, _)| layer.geometries().next().is_some());
+    let mut crs_sources = of_filled.map(|(_, source)| source);
+    let crs_source = crs_sources.find(|source| *source != CrsSource::Map).unwrap_or_default();
     let crs = common_crs(layers, &of_layer)?;
     let mut content = Content::new(besides == Besides::Description);
     for (layer, own) in layers.iter().zip(of_layer) {
@@ -112,7 +120,9 @@ pub fn survey(layers: &[&Layer], given: Option<&PyCrs>, besides: Besides) -> mar
         }
         content.end_layer(&layer.name, [(own, chains)]);
     }
-    content.survey(crs, besides == Besides::Geometries)
+    let mut survey = content.survey(crs, besides == Besides::Geometries)?;
+    survey.crs_source = crs_source;
+    Ok(survey)
 }
 
 /// Reads layers in any CRS, without what nobody can place.
@@ -129,17 +139,6 @@ pub fn numbers(layers: &[Layer]) -> marking::Result<Numbers<PyCrs>> {
         content.end_layer(&layer.name, [(layer.crs.clone(), chains)]);
     }
     Ok(content.into_numbers())
-}
-
-/// Returns the CRS of a layer, which is the given one where it has none of its own.
-fn crs_of(layer: &Layer, given: Option<&PyCrs>) -> marking::Result<Option<PyCrs>> {
-    match (&layer.crs, given) {
-        (Some(own), Some(given)) if !own.is_same(given) => {
-            let [crs, srs] = own.names_apart(given);
-            Err(marking::Error::ContradictingSrs { crs, srs })
-        }
-        (own, given) => Ok(own.as_ref().or(given).cloned()),
-    }
 }
 
 /// Returns the CRS of layers with geometries, as one mesh needs one.

@@ -6,8 +6,10 @@ use crate::{
     layer::{Besides, Layer, numbers, survey},
 };
 use meshmark_core::{fingerprint_record::BaseEntry, ground::Ground, options::join_list};
-use meshmark_marking::{self as marking, Crs, Extent, FeatureGeometry, Outline, Survey};
-use meshmark_verification::{IfSuited, Maps, Suited, Suspect, compare::Compared, words::printable};
+use meshmark_marking::{self as marking, Crs, Extent, FeatureGeometry, KnownCrs, Outline, Survey};
+use meshmark_verification::{
+    IfSuited, Maps, StatedCrs, Suited, Suspect, compare::Compared, words::printable,
+};
 use pyo3::prelude::*;
 use std::collections::BTreeSet;
 
@@ -35,11 +37,11 @@ impl LayeredMaps {
         &self,
         reference: usize,
         layers: Option<&[String]>,
-        srs: Option<&str>,
+        crs: StatedCrs,
         besides: Besides,
     ) -> marking::Result<Survey<PyCrs>> {
-        let srs = srs.map(PyCrs::parse).transpose()?;
-        survey(&self.references[reference].chosen(layers)?, srs.as_ref(), besides)
+        let known = KnownCrs::parse(crs.srs, crs.recorded)?;
+        survey(&self.references[reference].chosen(layers)?, &known, besides)
     }
 
     fn of_reference(&self, reference: usize, source: marking::Error) -> VerificationError {
@@ -54,7 +56,8 @@ impl LayeredMaps {
 impl LayeredMap {
     /// Returns its metric, metres on the ground.
     pub fn ground(&self) -> marking::Result<Ground> {
-        survey(&self.chosen(None)?, None, Besides::Nothing)?.measure().cloned()
+        let known = KnownCrs::parse(None, None)?;
+        survey(&self.chosen(None)?, &known, Besides::Nothing)?.measure().cloned()
     }
 
     /// Returns its geometries in order, and the first CRS of a layer.
@@ -101,9 +104,9 @@ impl Maps for LayeredMaps {
         &mut self,
         reference: usize,
         layers: Option<&[String]>,
-        srs: Option<&str>,
+        crs: StatedCrs,
     ) -> IfSuited<Survey<PyCrs>, VerificationError> {
-        match self.read(reference, layers, srs, Besides::Description) {
+        match self.read(reference, layers, crs, Besides::Description) {
             Ok(survey) => Ok(Suited::Yes(survey)),
             Err(error) if error.is_about_options() => Ok(Suited::No(self.of_reference(reference, error))),
             Err(error) => Err(self.of_reference(reference, error)),
@@ -115,7 +118,8 @@ impl Maps for LayeredMaps {
         reference: usize,
         entry: &BaseEntry,
     ) -> Result<Option<Survey<PyCrs>>, VerificationError> {
-        match self.read(reference, entry.layers.as_deref(), entry.srs.as_deref(), Besides::Nothing) {
+        let crs = StatedCrs { srs: entry.srs.as_deref(), recorded: None };
+        match self.read(reference, entry.layers.as_deref(), crs, Besides::Nothing) {
             Ok(survey) => Ok(Some(survey)),
             Err(error) if error.is_of_other_layers() => Ok(None),
             Err(error) => Err(self.of_reference(reference, error)),

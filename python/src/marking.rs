@@ -15,10 +15,10 @@ use meshmark_core::{
     fingerprint_record::Divided,
     key::SecretKey,
     map::Map,
-    options::{Options, Spelling, Subject},
+    options::{self, Options, Spelling, Subject},
     series::{Edition, Series},
 };
-use meshmark_marking::{self as marking, Lineage, Moves, Survey, Unmarked, damage_warning};
+use meshmark_marking::{self as marking, KnownCrs, Lineage, Moves, Survey, Unmarked, damage_warning};
 use pyo3::{prelude::*, types::PyBytes};
 
 /// The geometries of each layer, well-known binary.
@@ -60,9 +60,9 @@ pub fn mark<'py>(
     };
     let options = subjects.iter().map(parse).collect::<PyResult<Vec<Options>>>()?;
     let Some(first) = options.first() else { return Ok((Vec::new(), Vec::new())) };
-    let srs = first.srs.as_deref().map(PyCrs::parse).transpose().map_err(of_map)?;
+    let known = KnownCrs::parse(first.srs.as_deref(), None).map_err(of_map)?;
     let all: Vec<&Layer> = layers.iter().collect();
-    let map = survey(&all, srs.as_ref(), Besides::Geometries).map_err(of_map)?;
+    let map = survey(&all, &known, Besides::Geometries).map_err(of_map)?;
     let (layers, geos) = (&layers[..], &PyGeos(geos));
     let Copies { copies, warnings } = run(py, progress.as_ref(), threads, |job| {
         marked(layers, &map, (&key.0, &options), geos, job).map_err(of_map)

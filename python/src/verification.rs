@@ -69,16 +69,17 @@ pub fn verify(
     let marks = marks(&chosen, &sought)?;
     let mut maps = LayeredMaps::new(&maps.references, &maps.suspect)?;
     let Settings { show_recipients, threads, progress, .. } = settings;
-    let skipped = Mutex::new(Vec::new());
+    let warnings = Mutex::new(Vec::new());
     let report = run(py, progress.as_ref(), threads, |job| {
-        let mut warn = |text: &str| skipped.lock().expect("nobody panics with it").push(text.to_owned());
+        let mut warn = |text: &str| warnings.lock().expect("nobody panics with it").push(text.to_owned());
         let mut report = verified(&mut maps, &chosen, marks, job, &mut warn)?;
+        report.warning().iter().for_each(|text| warn(text));
         if !show_recipients {
             report.hide_others();
         }
         Ok(Report(report.into_file()))
     });
-    for text in skipped.into_inner().expect("nobody panics with it") {
+    for text in warnings.into_inner().expect("nobody panics with it") {
         let text = CString::new(visible(&text)).expect("a visible text has no null character");
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)?;
     }

@@ -18,5 +18,5 @@ pub mod verify;
 pub mod words;
 
 pub use error::{Error, Result};
-pub use maps::{IfSuited, Maps, Suited, Suspect};
+pub use maps::{IfSuited, Maps, StatedCrs, Suited, Suspect};
 pub use stages::Stages;

@@ -19,8 +19,8 @@ pub trait Maps {
     /// files.
     fn name(&self, reference: usize) -> Option<String>;
 
-    /// Reads these layers of a reference (all without names), which is in this CRS if it has none of its
-    /// own.
+    /// Reads these layers of a reference (all without names), of which this is known beside the map
+    /// ([`KnownCrs`](marking::KnownCrs)).
     ///
     /// # Errors
     /// Fails when it cannot be read.
@@ -28,7 +28,7 @@ pub trait Maps {
         &mut self,
         reference: usize,
         layers: Option<&[String]>,
-        srs: Option<&str>,
+        crs: StatedCrs,
     ) -> IfSuited<Survey<Self::Crs>, Self::Error>;
 
     /// Reads the vertices of a reference as an edition describes it; nothing where a map lacks its layers.
@@ -46,6 +46,15 @@ pub trait Maps {
 
     /// Returns the error of a suspect that was read and cannot be compared.
     fn of_suspect(&self, error: marking::Error) -> Self::Error;
+}
+
+/// The CRS of a reference, as option and record state it.
+#[derive(Debug, Clone, Copy)]
+pub struct StatedCrs<'a> {
+    /// That of a reference that has none.
+    pub srs: Option<&'a str>,
+    /// That in which it was marked.
+    pub recorded: Option<&'a str>,
 }
 
 /// A value, if the reference is suited to the request.

@@ -129,7 +129,8 @@ fn border(sheets: &[Known], number: usize, options: &Options) -> Result<Border> 
 
 fn read(path: &Path, options: &Options) -> Result<Survey> {
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
-    maps::sheet(path, &Reading { layers, srs, landmarks: LabelFields::None, geometries: false })
+    let landmarks = LabelFields::None;
+    maps::sheet(path, &Reading { layers, srs, recorded_crs: None, landmarks, geometries: false })
 }
 
 fn map<'a>(path: &Path, survey: &'a Survey, options: &Options) -> Result<meshmark_core::map::Map<'a>> {

@@ -506,6 +506,8 @@ fn wrong_reports_are_refused() {
         ("/left_out/features", json!(-1)),
         ("/left_out/named", json!([""])),
         ("/parameters/demodulator", json!("best")),
+        ("/parameters/crs_source", json!("file")),
+        ("/parameters/crs_of_reference", json!("")),
         ("/parameters/significance", json!(1)),
         ("/parameters/radius_m", json!(0)),
         ("/parameters/observations", json!("edges")),

@@ -74,7 +74,11 @@ fn described(report: &Report) -> [Markup; 2] {
     };
     let reference_crs = report.parameters.crs.as_deref().unwrap_or("no CRS");
     let map = |vertices: usize, crs: &str| html! { (count(vertices)) " vertices, " (crs) };
-    [map(report.vertices.suspect, &suspect_crs), map(report.vertices.reference, reference_crs)]
+    let reference = html! {
+        (map(report.vertices.reference, reference_crs))
+        @if let Some(sentence) = explain::other_crs(report) { br; (sentence) }
+    };
+    [map(report.vertices.suspect, &suspect_crs), reference]
 }
 
 /// Returns the recipient. Among the records that were tried, only a matching one is named.

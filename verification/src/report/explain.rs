@@ -56,8 +56,9 @@ fn compared(inputs: &Inputs, report: &Report) -> Vec<String> {
             counted(v.reference, "distinct vertex"),
             p.crs.as_deref().unwrap_or("no CRS")
         ),
-        format!("The key {} has the public id {}.", inputs.key.path, p.key_id),
     ];
+    sentences.extend(other_crs(report));
+    sentences.push(format!("The key {} has the public id {}.", inputs.key.path, p.key_id));
     sentences.push(match &inputs.record {
         Some(record) => format!("The record {} belongs to this key and this reference.", record.path),
         None if report.candidates.is_some() => {
@@ -249,6 +250,12 @@ pub(crate) fn assumed(report: &Report) -> Vec<String> {
             .into()
     });
     read_as.into_iter().chain(polynomial).collect()
+}
+
+/// Returns a sentence about a reference whose CRS is not its own.
+pub(crate) fn other_crs(report: &Report) -> Option<String> {
+    let text = report.other_crs()?;
+    Some(format!("T{}.", text.strip_prefix('t')?))
 }
 
 /// Returns a sentence about what the suspect has that was not compared.

@@ -194,6 +194,8 @@ pub struct ReportParameters {
     pub mark: MarkParameters,
     pub layers: Option<Vec<String>>,
     pub crs: Option<String>,
+    pub crs_source: Option<&'static str>,
+    pub crs_of_reference: Option<String>,
     pub demodulator: &'static str,
     pub radius_m: f64,
     pub radius_reason: RadiusReason,

@@ -45,6 +45,7 @@ impl Report {
             v.suspect,
             self.read_from()
         ));
+        lines.extend(self.other_crs().map(|text| format!("CRS:          {text}")));
         lines.extend(self.deposit.iter().flat_map(|deposit| deposit.to_lines()));
         lines.extend(self.left_out.to_text().map(|faults| format!("left out:     {faults}")));
         lines.push(format!("registration: {}", self.registration.to_text()));

@@ -16,6 +16,7 @@ use meshmark_detection::{
     Demodulator,
     decision::{Decision, Decoys, Verdict, fingerprints, p_any_message_log10},
 };
+use meshmark_marking::CrsSource;
 use std::collections::BTreeMap;
 
 /// Creates the report on an examination for a message and the decision.
@@ -263,6 +264,11 @@ fn report_parameters(request: &Request, seen: &Examination, verdict: Verdict) ->
         Some(Found::Fingerprint(evidence)) => Some(evidence.noise_m),
         None => None,
     };
+    let (crs_source, crs_of_reference) = match &seen.crs_source {
+        CrsSource::Map => (Some("reference"), None),
+        CrsSource::Option => (Some("option"), None),
+        CrsSource::Record { other } => (Some("record"), other.clone()),
+    };
     ReportParameters {
         key_id: request.settings.key.id(),
         recipient: request.recipient().map(String::from),
@@ -270,6 +276,8 @@ fn report_parameters(request: &Request, seen: &Examination, verdict: Verdict) ->
         mark,
         layers: request.layers.clone(),
         crs: seen.crs.clone(),
+        crs_source: crs_source.filter(|_| seen.crs.is_some()),
+        crs_of_reference,
         demodulator: match request.settings.demodulator {
             Demodulator::Paper => "paper",
             Demodulator::Joint => "joint",

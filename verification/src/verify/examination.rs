@@ -18,7 +18,7 @@ use meshmark_detection::{
     matching::{LEAST_MATCHED, Radius},
     registration::{Registrar, Registration, Start},
 };
-use meshmark_marking::{self as marking, Bases, Crs, LeftOut, Survey, TransformableCrs};
+use meshmark_marking::{self as marking, Bases, Crs, CrsSource, LeftOut, Survey, TransformableCrs};
 
 /// The evidence of a suspect.
 pub struct Examination {
@@ -32,6 +32,8 @@ pub struct Examination {
     pub reference_digest: String,
     /// CRS of the reference.
     pub crs: Option<String>,
+    /// Where it comes from.
+    pub crs_source: CrsSource,
     /// CRS of the layers of the suspect.
     pub suspect_crs: Vec<String>,
     /// The matching radius.
@@ -118,7 +120,8 @@ pub fn examine<M: Maps>(
     };
     let seen = seen(request, (&matched, evidence), registration);
     let (left_out, crs) = (suspect.left_out, reference.crs().map(|crs| crs.brief_name()));
-    Ok(Suited::Yes(Examination { suspect_crs, left_out, crs, reference_digest: digest, ..seen }))
+    let crs_source = reference.crs_source.clone();
+    Ok(Suited::Yes(Examination { suspect_crs, left_out, crs, crs_source, reference_digest: digest, ..seen }))
 }
 
 /// Meshes the reference, which has the vertices of its bases, too; `newest` has its own alone.
@@ -203,6 +206,7 @@ fn seen(
         vertices,
         reference_digest: reference.digest(),
         crs: None,
+        crs_source: CrsSource::Map,
         suspect_crs: Vec::new(),
         left_out: LeftOut::default(),
         radius,

@@ -25,10 +25,11 @@ pub fn requests(
     let Settings { key, demodulator, .. } = settings;
     let possible = match record {
         Some(ReadRecord { record, .. }) => {
-            Options::parse(options.iter().copied())?;
+            let given = Options::parse(options.iter().copied())?;
             check_options(options, record)?;
             check_key(record, key)?;
-            vec![record.options()?]
+            let recorded = record.options()?;
+            vec![Options { srs: given.srs.or(recorded.srs), ..recorded }]
         }
         None => possible_options(options, *demodulator)?,
     };
@@ -45,6 +46,7 @@ pub fn requests(
             parameters: options.parameters,
             layers: options.layers,
             srs: options.srs,
+            recorded_crs: record.and_then(|read| read.record.crs()).map(String::from),
         })
     };
     possible.into_iter().map(request).collect()
@@ -97,6 +99,10 @@ fn check_options(options: &[(&str, &str)], record: &Recorded) -> Result<()> {
         let alone = Options::parse([(*name, *value)])?;
         // A smaller map is not cut, and its record does not say at what size it would have been.
         if *name == "PART_SIZE" && alone.parts_of(vertices) == recorded.parts_of(vertices) {
+            continue;
+        }
+        // Other texts may mean the same CRS (references.rs).
+        if *name == "SRS" && record.crs().is_some() {
             continue;
         }
         let on_record = match (*name, record) {

@@ -173,6 +173,7 @@ fn groups(settings: &Settings, candidates: Vec<Candidate>) -> Vec<Group> {
             r.parameters == *parameters
                 && r.layers == *layers
                 && r.srs == *srs
+                && r.recorded_crs.as_deref() == candidate.read.record.crs()
                 && r.sought.is_like(&sought)
                 && r.lineage == lineage
                 && r.part_size == part_size
@@ -192,6 +193,7 @@ fn groups(settings: &Settings, candidates: Vec<Candidate>) -> Vec<Group> {
             parameters: parameters.clone(),
             layers: layers.clone(),
             srs: srs.clone(),
+            recorded_crs: candidate.read.record.crs().map(String::from),
         };
         groups.push(Group { request, candidates: vec![candidate] });
     }

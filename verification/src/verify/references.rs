@@ -4,14 +4,14 @@ use super::{
     belonging::{check_reference, is_made_from},
     request::Request,
 };
-use crate::{Error, IfSuited, Maps, Stages, Suited};
+use crate::{Error, IfSuited, Maps, Stages, StatedCrs, Suited};
 use meshmark_core::fingerprint_record::BaseEntry;
-use meshmark_marking::{self as marking, Bases, Lineage, Survey};
+use meshmark_marking::{self as marking, Bases, KnownCrs, Lineage, Survey};
 
 /// Reads a reference of a request.
 ///
 /// # Errors
-/// Fails when it cannot be read.
+/// Fails when it cannot be read, and when the option SRS contradicts the record.
 pub fn read_reference<M: Maps>(
     maps: &mut M,
     reference: usize,
@@ -19,7 +19,13 @@ pub fn read_reference<M: Maps>(
     stages: &mut Stages,
 ) -> IfSuited<Survey<M::Crs>, M::Error> {
     stages.start("reading", 0);
-    maps.reference(reference, request.layers.as_deref(), request.srs.as_deref())
+    let crs = StatedCrs { srs: request.srs.as_deref(), recorded: request.recorded_crs.as_deref() };
+    if let Some(value) = crs.srs
+        && KnownCrs::<M::Crs>::parse(crs.srs, crs.recorded).is_ok_and(|known| known.is_contradiction())
+    {
+        return Err(Error::Contradiction { option: "SRS".into(), value: value.into() }.into());
+    }
+    maps.reference(reference, request.layers.as_deref(), crs)
 }
 
 /// Reads the only reference, or that of several from which the record of the request was made, and

@@ -113,6 +113,8 @@ pub struct Request {
     pub layers: Option<Vec<String>>,
     /// CRS of the reference when it has none.
     pub srs: Option<String>,
+    /// CRS of the reference when it was marked, from a record.
+    pub recorded_crs: Option<String>,
 }
 
 /// Returns the lineage of a record of a map that is not one part.

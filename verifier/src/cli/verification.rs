@@ -195,6 +195,7 @@ fn examine_confined(args: VerifyArgs, folder: &Path) -> Result<Examined> {
         write_evidence_map(&map, crs.as_ref(), &Handover(folder).evidence_map())?;
     }
     let evidence = report.evidence.take(); // only a report file holds it
+    report.warning().iter().for_each(|text| warn(text));
     let code = ExitCode::from(report.verdict);
     let mut answer = if json { report.to_json() } else { report.to_text() };
     let Some(digests) = digests else { return Ok(Examined { answer, reports: Vec::new(), code }) };

@@ -140,6 +140,7 @@ pub fn vertices(path: &Path, layers: Option<&Vec<String>>, srs: Option<&String>)
     let reading = Reading {
         layers: layers.map(Vec::as_slice),
         srs: srs.map(String::as_str),
+        recorded_crs: None,
         landmarks: LabelFields::None,
         geometries: false,
     };

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use meshmark_core::fingerprint_record::BaseEntry;
 use meshmark_dataset::{CoordinateSystem, LabelFields, Survey};
 use meshmark_marking as marking;
-use meshmark_verification::{IfSuited, Maps, Suited, Suspect};
+use meshmark_verification::{IfSuited, Maps, StatedCrs, Suited, Suspect};
 use std::path::PathBuf;
 
 /// References and a suspect.
@@ -39,16 +39,15 @@ impl Maps for MapFiles {
         &mut self,
         reference: usize,
         layers: Option<&[String]>,
-        srs: Option<&str>,
+        crs: StatedCrs,
     ) -> IfSuited<Survey, Error> {
         let landmarks = match self.landmarks.as_slice() {
             [] => LabelFields::All,
             names => LabelFields::Named(names),
         };
-        match maps::reference(
-            &self.references[reference],
-            &Reading { layers, srs, landmarks, geometries: false },
-        ) {
+        let StatedCrs { srs, recorded: recorded_crs } = crs;
+        let reading = Reading { layers, srs, recorded_crs, landmarks, geometries: false };
+        match maps::reference(&self.references[reference], &reading) {
             Ok(reference) => Ok(Suited::Yes(reference)),
             Err(error) if error.is_about_options() => Ok(Suited::No(error)),
             Err(error) => Err(error),

@@ -27,6 +27,8 @@ pub struct Reading<'a> {
     pub layers: Option<&'a [String]>,
     /// CRS of a map that has none.
     pub srs: Option<&'a str>,
+    /// CRS in which the map was marked, from its record.
+    pub recorded_crs: Option<&'a str>,
     /// Attributes that become landmarks.
     pub landmarks: LabelFields<'a>,
     /// Whether to keep the geometries.
@@ -54,7 +56,8 @@ pub fn sheet(path: &Path, reading: &Reading) -> Result<Survey> {
 /// Reads the reference of an edition; nothing where a map lacks its layers.
 pub fn base_reference(path: &Path, entry: &BaseEntry) -> Result<Option<Survey>> {
     let (layers, srs) = (entry.layers.as_deref(), entry.srs.as_deref());
-    let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: false };
+    let landmarks = LabelFields::None;
+    let reading = Reading { layers, srs, recorded_crs: None, landmarks, geometries: false };
     match reference(path, &reading) {
         Ok(survey) => Ok(Some(survey)),
         Err(Error::Map { source, .. }) if source.is_of_other_layers() => Ok(None),
@@ -95,7 +98,8 @@ pub(crate) fn source(
     }
     let dataset = open("map", path)?;
     let (layers, srs) = (options.layers.as_deref(), options.srs.as_deref());
-    let reading = Reading { layers, srs, landmarks: LabelFields::None, geometries: true };
+    let landmarks = LabelFields::None;
+    let reading = Reading { layers, srs, recorded_crs: None, landmarks, geometries: true };
     let survey = read("map", path, &dataset, &reading)?;
     // Foreign members of GeoJSON are read from the plain copy (distribute/plain.rs).
     let foreign = ForeignMembers { of: &|_| None, column: None };
@@ -127,8 +131,9 @@ pub(super) fn first_crs(dataset: &Dataset) -> Option<CoordinateSystem> {
 
 /// Returns the ground metric of the reference of a comparison.
 pub fn ground(path: &Path, layers: Option<&[String]>) -> Result<Ground> {
-    let survey =
-        reference(path, &Reading { layers, srs: None, landmarks: LabelFields::None, geometries: false })?;
+    let landmarks = LabelFields::None;
+    let reading = Reading { layers, srs: None, recorded_crs: None, landmarks, geometries: false };
+    let survey = reference(path, &reading)?;
     survey.measure().cloned().map_err(|error| Error::Unmeasured {
         what: "reference",
         path: path.into(),
@@ -194,6 +199,7 @@ pub(super) fn selection<'a>(reading: &Reading<'a>) -> Selection<'a> {
     Selection {
         layers: reading.layers,
         srs: reading.srs,
+        recorded_crs: reading.recorded_crs,
         labels: reading.landmarks,
         geometries: reading.geometries,
         most_vertices: MOST_VERTICES,

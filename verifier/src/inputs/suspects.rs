@@ -18,7 +18,8 @@ use std::{
 };
 
 /// A suspect is read whole, with all its attributes.
-const WHOLE: Reading = Reading { layers: None, srs: None, landmarks: LabelFields::All, geometries: false };
+const WHOLE: Reading =
+    Reading { layers: None, srs: None, recorded_crs: None, landmarks: LabelFields::All, geometries: false };
 
 /// Reads the suspect.
 pub fn suspect(suspect: &PrivateCopy) -> Result<Suspect<CoordinateSystem>> {
