@@ -25,7 +25,8 @@ pub enum Error {
     NoReferenceOfRecord { references: usize },
     SeveralReferences,
     NoRecord,
-    OtherCount { reference: usize, marked: usize },
+    OtherLayers { reference: Vec<String>, marked: Vec<String> },
+    OtherCount { layer: Option<String>, reference: usize, marked: usize },
     OtherVertices { layer: String, fid: String, other: String },
     OtherCrs { own: String, other: String },
 }
@@ -120,11 +121,20 @@ impl Error {
                 "none of the records is of this key and this reference: give those of the copies that were made of it"
                     .into()
             }
-            Error::OtherCount { reference, marked } => format!(
-                "the reference has {} and the marked map {marked}: compare a map with the copy that was marked from it, \
-                 before anything is removed",
-                counted(*reference, "geometry")
+            Error::OtherLayers { reference, marked } => format!(
+                "layers without features in the other map under the same name: {} of the reference, and {} of the marked map; \
+                 compare a map with the copy that was marked from it, and give counterparts the same name",
+                names_of(reference),
+                names_of(marked)
             ),
+            Error::OtherCount { layer, reference, marked } => {
+                let of_layer = layer.as_ref().map_or(String::new(), |layer| format!(" in layer \"{layer}\""));
+                format!(
+                    "the reference has {}{of_layer} and the marked map {marked}: compare a map with the copy that was marked \
+                     from it, before anything is removed",
+                    counted(*reference, "geometry")
+                )
+            }
             Error::OtherVertices { layer, fid, other } => format!(
                 "layer \"{layer}\", feature {fid} of the reference does not have the vertices of its counterpart in the \
                  marked map (layer \"{other}\"): features correspond by their order"
@@ -134,6 +144,14 @@ impl Error {
                  brought into another CRS"
             ),
         }
+    }
+}
+
+/// Returns names in quotes, or that there are none.
+fn names_of(layers: &[String]) -> String {
+    match layers {
+        [] => "none".into(),
+        names => names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", "),
     }
 }
 

@@ -1,8 +1,9 @@
 //! The effect of marking on a map.
 //!
-//! Features correspond by their order within a layer, vertices by their order within a feature: the
-//! driver changes neither. Lengths, angles and areas are measured on the ground.
+//! Features correspond by their order within a layer of the same name, vertices by their order within a
+//! feature: the driver changes neither. Lengths, angles and areas are measured on the ground.
 
+mod counterparts;
 mod crossings;
 pub mod detail;
 mod text;
@@ -10,6 +11,7 @@ mod text;
 pub use crossings::Crossings;
 
 use crate::{Error, Result};
+use counterparts::Pair;
 use detail::{Detail, Findings};
 use meshmark_core::{
     distortion::{AngleChange, Areas, Corner, Displacement, Hausdorff, Overlaps, Validity},
@@ -72,12 +74,6 @@ pub(crate) struct Pairs<'a> {
     pub grid: f64,
 }
 
-/// A geometry before and after.
-pub(crate) struct Pair {
-    pub before: Outline,
-    pub after: Outline,
-}
-
 /// The details of a comparison to keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Details {
@@ -105,9 +101,6 @@ pub fn compare<C: TransformableCrs>(
     precision: Option<f64>,
     details: Details,
 ) -> Result<Comparison> {
-    if before.len() != after.len() {
-        return Err(Error::OtherCount { reference: before.len(), marked: after.len() });
-    }
     let places = before.iter().zip(&after).find_map(|(a, b)| a.outline.first().zip(b.outline.first()));
     let away_m = places
         .map_or(0.0, |(from, to)| measure.metres_between(from, to).iter().fold(0.0, |a: f64, b| a.hypot(*b)));
@@ -117,16 +110,8 @@ pub fn compare<C: TransformableCrs>(
         let [own, other] = own.names_apart(&other);
         return Err(Error::OtherCrs { own, other });
     }
-    let features: Vec<Pair> = before.into_iter().zip(after).map(pair).collect::<Result<_>>()?;
+    let features = counterparts::pairs(before, after)?;
     Ok(Pairs { features, measure, geos, grid: precision.unwrap_or(0.0) }.compare(details))
-}
-
-fn pair((before, after): (FeatureGeometry, FeatureGeometry)) -> Result<Pair> {
-    let counts = |feature: &FeatureGeometry| feature.outline.chains.iter().map(Vec::len).collect::<Vec<_>>();
-    if before.layer != after.layer || counts(&before) != counts(&after) {
-        return Err(Error::OtherVertices { layer: before.layer, fid: before.fid, other: after.layer });
-    }
-    Ok(Pair { before: before.outline, after: after.outline })
 }
 
 impl Pairs<'_> {
