@@ -36,6 +36,9 @@ pub struct Marked {
     pub junctions: usize,
     /// How many vertices moved differently from the mark to keep the topology of the map.
     pub attenuated: usize,
+    /// How many vertices carry no sign, as their part has too few free vertices for a patch, or these lie on
+    /// one line.
+    pub signless: usize,
 }
 
 impl Marked {
@@ -49,6 +52,7 @@ impl Marked {
             patches,
             junctions,
             attenuated: settled.attenuated,
+            signless: 0,
         }
     }
 }

@@ -263,6 +263,7 @@ impl<'a> FingerprintEmbedding<'a> {
     /// [`crate::Error::FingerprintLost`].
     pub fn settle(&self, fingerprint: &Fingerprint, wanted: Wanted) -> Result<Marked> {
         let patches = self.divided(&wanted).parts.iter().map(|part| part.patches).sum();
+        let signless = self.signless(&wanted);
         let in_boxes: Score =
             wanted.in_boxes.iter().fold(Score::default(), |all, settled| all.and(settled.score));
         let hanging_in_boxes = self.newest_in_boxes(&wanted).map(|newest| newest.hanging);
@@ -285,7 +286,20 @@ impl<'a> FingerprintEmbedding<'a> {
             Ground::Boxes(_) => None,
         };
         let hanging = hanging_in_boxes.or_else(|| self.series.hanging()).or_else(of_whole).unwrap_or(0);
-        Ok(Marked::new(&self.series.map(), newest, (patches, hanging)))
+        Ok(Marked { signless, ..Marked::new(&self.series.map(), newest, (patches, hanging)) })
+    }
+
+    /// Returns how many vertices of the newest map carry no sign, as a part has too few that are free.
+    fn signless(&self, wanted: &Wanted) -> usize {
+        let newest = self.series.len() - 1;
+        match (self.series.boxes(newest), self.newest_in_boxes(wanted)) {
+            (Some(boxes), Some(settled)) => {
+                let is_empty = |number: &usize| settled.patches[*number] == 0;
+                (0..boxes.len()).filter(is_empty).map(|number| boxes.vertices(number)).sum()
+            }
+            _ if self.works.iter().any(|work| work.edition == newest) => 0,
+            _ => self.series.census().map_or(0, |census| census.free),
+        }
     }
 
     /// Returns the newest map after marking, if it is in boxes.

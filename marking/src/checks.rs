@@ -47,6 +47,38 @@ pub fn check_scale(map: &Map, crs: Option<&dyn Crs>) -> Result<()> {
     }
 }
 
+/// Returns the warning about a name of a recipient that looks like another one.
+pub fn spelling_warning(recipient: &str) -> Option<String> {
+    (composed(recipient) != recipient).then(|| {
+        format!(
+            "the recipient \"{}\" is written in the decomposed form of Unicode, with letters and accents as characters of \
+             their own: whoever types the name means another recipient; give it composed (NFC)",
+            visible(recipient)
+        )
+    })
+}
+
+/// Up to this share of the vertices may carry no sign without a warning.
+const MOST_SIGNLESS: f64 = 0.05;
+
+/// Returns the warning about a copy of which a good part carries no sign, as parts of the map have too few
+/// free vertices.
+pub fn signless_warning(marked: &Marked, options: &Options, spelling: Spelling) -> Option<String> {
+    let (signless, vertices) = (marked.signless, marked.coords.len());
+    let remedy = match options.bases {
+        Some(_) => format!("leave {} out, or lower {}", spelling.name("BASE"), spelling.name("PATCH_SIZE")),
+        None => format!("raise {} or lower {}", spelling.name("PART_SIZE"), spelling.name("PATCH_SIZE")),
+    };
+    (signless as f64 > MOST_SIGNLESS * vertices as f64).then(|| {
+        format!(
+            "{signless} of {vertices} vertices ({:.0} %) stay unmarked, as their parts of the map have fewer than {} \
+             vertices that are free to move, or have them on one line: a piece of these alone shows no mark; {remedy}",
+            100.0 * signless as f64 / vertices as f64,
+            options.parameters.patch_size
+        )
+    })
+}
+
 /// Returns warnings about what is legal and probably not intended. `message` is what the code carries;
 /// a fingerprint has none.
 pub fn warnings(

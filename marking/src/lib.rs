@@ -34,7 +34,7 @@ pub mod wkb;
 
 pub use bases::{Bases, ReadBase};
 pub use chains::Chains;
-pub use checks::{check_extent, check_scale, warnings};
+pub use checks::{check_extent, check_scale, signless_warning, spelling_warning, warnings};
 pub use content::{Content, Numbers};
 pub use crs::{Crs, CrsKind, Metric, ground};
 pub use damage::damage_warning;

@@ -236,7 +236,10 @@ impl Marking {
             marked.patches,
             spelling,
         );
-        let warnings = request.exposed.iter().cloned().chain(of_mark).chain(damage).collect();
+        let signless = marking::signless_warning(&marked, options, spelling);
+        let of_name = request.subject.recipient().and_then(marking::spelling_warning);
+        let of_request = request.exposed.iter().cloned().chain(of_name);
+        let warnings = of_request.chain(of_mark).chain(signless).chain(damage).collect();
         Ok(Marking {
             name: source.name,
             map,

@@ -97,6 +97,7 @@ fn marked(
         if copies.is_empty() {
             let message = options.coefficients.is_none().then(|| subject.carried(key));
             warnings = marking::warnings(options, message.as_ref(), described, marked.patches, spelling);
+            warnings.extend(marking::signless_warning(&marked, options, spelling));
             warnings.extend(damage_warning(parameters, &marked.angles, Some(&distortion.areas), spelling));
         }
         let reference = marking::reference(described.0, described.1, marked.patches);

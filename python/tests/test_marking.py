@@ -76,6 +76,12 @@ class LikeTheDriver(Folder):
     def test_a_town_in_parts(self):
         self.check(FIXTURES / "helsinki.gpkg", RECIPIENT="ACME GmbH", PART_SIZE=1920)
 
+    def test_parts_that_carry_no_sign(self):
+        line = shapely.LineString([(1000 + at, 0) for at in range(3000)])
+        layers = {"houses": town(25), "line": geopandas.GeoDataFrame(geometry=[line], crs="EPSG:3067")}
+        with self.assertWarnsRegex(UserWarning, "of 5500 vertices .* stay unmarked, .* raise part_size or lower patch_size"):
+            meshmark.mark(layers, self.key, recipient="ACME GmbH", part_size=1920)
+
     def test_a_message(self):
         self.check(FIXTURES / "kotka.gpkg", MESSAGE="00112233445566778899aabbccddeeff")
 

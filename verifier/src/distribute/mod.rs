@@ -145,6 +145,8 @@ fn run(
                 let lineage = bases.lineage(marks.divided(&wanted));
                 let marked = pool.install(|| marks.settle(copy, wanted)).map_err(Error::from);
                 let written = marked.and_then(|marked| {
+                    let signless = marking::signless_warning(&marked, options, Spelling::Flag);
+                    job.warnings.lock().expect("nobody panics with them").extend(signless);
                     let distortion = pool.install(|| job.unmarked.distortion(&marked, parameters));
                     writing::write(&job, copy, &marked.coords, (lineage, distortion))
                 });
