@@ -196,9 +196,15 @@ impl Certainty {
     }
 }
 
-/// Formats a log-likelihood ratio as odds, for example "1000 to 1".
+/// Formats a log-likelihood ratio as odds, for example "1100 to 1"; it has one decimal, and the odds two digits.
 fn odds(llr: f64) -> String {
-    if llr > 13.8 { "over a million to 1".into() } else { format!("{:.1} to 1", llr.exp()) }
+    let odds = llr.exp();
+    let place = 10f64.powf((odds.log10().floor() - 1.0).max(-1.0));
+    match place {
+        _ if odds > 1e6 => "over a million to 1".into(),
+        ..1.0 => format!("{odds:.1} to 1"),
+        _ => format!("{:.0} to 1", (odds / place).round() * place),
+    }
 }
 
 #[cfg(test)]
@@ -210,7 +216,12 @@ mod tests {
         let certainty = Certainty { weakest_llr: 0.0, median_llr: 7.0, over_1000_to_1: 3 };
         assert_eq!(
             certainty.to_text(5),
-            "weakest right with odds 1.0 to 1, median 1096.6 to 1; 3 of 5 over 1000 to 1"
+            "weakest right with odds 1.0 to 1, median 1100 to 1; 3 of 5 over 1000 to 1"
+        );
+        let all = [0.1, 2.3, 4.0, 13.7, 13.8, 13.9].map(odds);
+        assert_eq!(
+            all,
+            ["1.1 to 1", "10.0 to 1", "55 to 1", "890000 to 1", "990000 to 1", "over a million to 1"]
         );
     }
 }

@@ -38,6 +38,8 @@ pub fn conclude(
     let tested = found.zip(expected).map(|(found, expected)| disclosed::score(found.mark_score(expected)));
     let is_match = decision.verdict == Verdict::Match;
     let p = |exact: Option<f64>| disclosed::p_log10(exact, is_match);
+    let exact = decoded.as_ref().map_or(&[][..], |decoded| &decoded.message_llrs);
+    let bits = disclosed::scores(exact);
     let code = CodeEntry {
         name: request.parameters.code,
         channel_bit_errors: found.zip(expected).map(|(found, m)| found.channel_bit_errors(m)),
@@ -64,8 +66,8 @@ pub fn conclude(
         null_hypothesis: hypothesis.as_ref().map(|hypothesis| hypothesis.null),
         tried: decision.tried,
         bit_errors: decoded.as_ref().zip(expected).map(|(decoded, m)| decoded.message.errors(m)),
-        certainty: decoded.as_ref().and_then(|decoded| certainty(&decoded.message_llrs)),
-        bits: decoded.iter().flat_map(|d| &d.message_llrs).map(|llr| disclosed::score(*llr)).collect(),
+        certainty: certainty(&bits),
+        bits,
         code: Some(code),
         ..report(
             request,
@@ -231,7 +233,7 @@ fn report(
     }
 }
 
-/// Returns the certainty of bits, given their log-likelihood ratios; `None` without bits.
+/// Returns the certainty of bits, given their log-likelihood ratios as disclosed; `None` without bits.
 fn certainty(llrs: &[f64]) -> Option<Certainty> {
     let mut sure: Vec<f64> = llrs.iter().map(|llr| llr.abs()).collect();
     sure.sort_by(f64::total_cmp);
@@ -300,5 +302,12 @@ mod tests {
         let expected = Certainty { weakest_llr: 0.0, median_llr: 7.0, over_1000_to_1: 3 };
         assert_eq!(certainty(&[-20.0, 2f64.ln(), 7.0, -7.5, 0.0]), Some(expected));
         assert_eq!(certainty(&[]), None);
+    }
+
+    #[test]
+    fn the_odds_of_bits_disclose_no_more_digits_than_their_ratios() {
+        let certain = |llrs: &[f64]| certainty(&disclosed::scores(llrs));
+        assert_eq!(certain(&[2.0449, -7.0151, 9.0]), certain(&[1.9551, -6.9851, 9.0]));
+        assert_ne!(certain(&[2.1]), certain(&[2.0]));
     }
 }

@@ -21,6 +21,12 @@ pub fn score(exact: f64) -> f64 {
     (exact * SCORE_DECIMALS).round() / SCORE_DECIMALS + 0.0 // no negative zero
 }
 
+/// Returns log-likelihood ratios of bits as reported. What is derived from them, such as odds, is derived
+/// from these: the exact odds of one bit are an equation like an exact score.
+pub fn scores(exact: &[f64]) -> Vec<f64> {
+    exact.iter().map(|exact| score(*exact)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
