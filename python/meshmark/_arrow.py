@@ -18,16 +18,18 @@ DEFAULT_CRS = "OGC:CRS84"
 class Table:
     """A table whose geometry columns are well-known binary. It comes back as a table of pyarrow."""
 
-    def __init__(self, name, layer, geometry):
+    def __init__(self, name, layer, geometry, is_shared=False):
         self.table = pyarrow.table(layer)
         self.geo = json.loads((self.table.schema.metadata or {}).get(b"geo", b"{}"))
+        if is_shared and geometry not in self.table.column_names and self._columns(name, None):
+            geometry = None
         found = self._columns(name, geometry)
         if not found:
             raise TypeError(
                 f"layer {name!r} has no column that its metadata call a geometry: name the column of well-known binary "
                 "with geometry=, or make a GeoDataFrame of it"
             )
-        self.names = list(found)
+        self.names = self.table_columns = list(found)
         self.columns = [
             Column(name, [bytes(wkb) if wkb is not None else None for wkb in self._values(column)], crs)
             for column, crs in found.items()

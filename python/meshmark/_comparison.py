@@ -1,10 +1,12 @@
 """Comparison."""
 
+import math
+import numbers
 from typing import Any, Optional
 
 from . import _geos, _meshmark
-from ._layers import Map
-from ._options import check_threads
+from ._layers import maps_of
+from ._options import check_kind, check_run, check_switches
 
 
 def compare(
@@ -31,7 +33,7 @@ def compare(
     exact_displacements : bool
         Whether the result has exact displacements of vertices; it is then to be kept as secret as the records.
     geometry : str, optional
-        The geometry column of tables whose metadata name none.
+        The geometry column of those tables whose metadata name none; other layers have their own.
     threads : int, optional
         The number of threads; all processors by default. It changes no result.
 
@@ -44,6 +46,8 @@ def compare(
     ------
     MapError
         When a map cannot be read, or the two do not correspond.
+    OptionError
+        When `precision` is not greater than 0.
 
     Examples
     --------
@@ -54,6 +58,11 @@ def compare(
     >>> 0.01 < meshmark.compare(town, copy).rms_m < 0.2
     True
     """
-    check_threads(threads)
+    check_run(threads)
+    check_kind("precision", precision, (numbers.Real, type(None)), "a number")
+    check_switches({"exact_displacements": exact_displacements})
+    if precision is not None and not 0 < precision < math.inf:
+        raise _meshmark.OptionError(f"precision={precision} is not legal: give a number greater than 0")
     settings = {"precision": precision, "exact_displacements": exact_displacements, "threads": threads}
-    return _meshmark.compare(Map(reference, geometry), Map(marked, geometry), _geos, settings)
+    maps = maps_of([reference, marked], geometry)
+    return _meshmark.compare(*maps, _geos, settings)

@@ -6,7 +6,7 @@ from typing import Any, Optional
 
 from . import _geos, _meshmark
 from ._layers import Sources
-from ._options import check_options, check_threads, option_pairs
+from ._options import check_key, check_options, check_run, option_pairs
 
 # So many copies are in memory at once.
 BATCH = 16
@@ -61,7 +61,8 @@ def distribute(
     'Example Ltd'
     """
     check_options("distribute", options)
-    check_threads(threads)
+    check_key(key)
+    check_run(threads, progress)
     if isinstance(recipients, str):
         raise TypeError(f"recipients is the text {recipients!r}, and not a list of texts: use [{recipients!r}]")
     recipients = list(recipients)

@@ -99,10 +99,10 @@ def wkb_of(array):
 class Sources:
     """The layers of a map, whichever kind they have."""
 
-    def __init__(self, layers, geometry):
+    def __init__(self, layers, geometry, is_shared=False):
         self.is_named = isinstance(layers, dict)
         given = layers if self.is_named else {"layer": layers}
-        self.layers = {name: source(name, layer, geometry) for name, layer in given.items()}
+        self.layers = {name: source(name, layer, geometry, is_shared) for name, layer in given.items()}
 
     @property
     def columns(self):
@@ -120,7 +120,8 @@ class Map:
     """A map that is verified, as the extension takes it; the fields of these names become attributes, or all."""
 
     def __init__(self, layers, geometry, fields=None):
-        sources = Sources(layers, geometry)
+        sources = Sources(layers, geometry, is_shared=True)
+        self.uses_geometry = any(geometry in getattr(layer, "table_columns", ()) for layer in sources.layers.values())
         self.is_named, self.layers = sources.is_named, sources.columns
         self.fields = set()
         for layer in sources.layers.values():
@@ -129,9 +130,20 @@ class Map:
             layer.columns[0].attributes = texts_of(columns, len(layer.columns[0].geometries), fields)
 
 
-def source(name, layer, geometry):
-    """Return a layer of whichever kind; `geometry` names the geometry column of a table without metadata."""
-    if geometry is not None and (hasattr(layer, "geom_type") or isinstance(layer, numpy.ndarray)):
+def maps_of(all, geometry, fields=None):
+    """Return maps of which `geometry` names the column of those tables that have no metadata."""
+    maps = [Map(layers, geometry, fields if number else None) for number, layers in enumerate(all)]
+    if geometry is not None and not any(map.uses_geometry for map in maps):
+        raise TypeError(f"geometry={geometry!r} is for tables without metadata, and no map has such a column: leave it out")
+    return maps
+
+
+def source(name, layer, geometry, is_shared=False):
+    """Return a layer of whichever kind; `geometry` names the geometry column of a table without metadata.
+
+    Where several maps share it, it does not concern those that have geometry columns of their own.
+    """
+    if geometry is not None and not is_shared and (hasattr(layer, "geom_type") or isinstance(layer, numpy.ndarray)):
         raise TypeError(f"geometry={geometry!r} is for tables without metadata, and layer {name!r} is none")
     if hasattr(layer, "geom_type") and hasattr(layer, "index"):
         return (Frame if hasattr(layer, "columns") else Series)(name, layer)
@@ -148,7 +160,7 @@ def source(name, layer, geometry):
             from ._arrow import Table
         except ImportError:
             raise ImportError('a table needs pyarrow: pip install "meshmark[arrow]"') from None
-        return Table(name, layer, geometry)
+        return Table(name, layer, geometry, is_shared)
     raise TypeError(
         f"layer {name!r} is a {type(layer).__name__}, and not a GeoDataFrame, an array of shapely's geometries or a "
         "table with the Arrow interface: make one with geopandas.GeoDataFrame(..., geometry=..., crs=...)"

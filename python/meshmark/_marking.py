@@ -6,7 +6,7 @@ from typing import Any, Optional
 
 from . import _geos, _meshmark
 from ._layers import Sources
-from ._options import check_options, check_threads, option_pairs
+from ._options import check_key, check_options, check_run, option_pairs
 
 
 def mark(

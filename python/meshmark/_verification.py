@@ -1,11 +1,12 @@
 """Verification."""
 
-from collections.abc import Callable, Mapping, Sequence
+import numbers
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Optional, Union
 
 from . import _meshmark
-from ._layers import Map
-from ._options import check_options, check_threads, option_pairs
+from ._layers import maps_of
+from ._options import check_key, check_kind, check_options, check_run, check_switches, option_pairs
 
 
 def verify(
@@ -50,7 +51,7 @@ def verify(
     srs : str, optional
         The CRS of a reference that has none, such as "EPSG:3067".
     geometry : str, optional
-        The geometry column of tables whose metadata name none.
+        The geometry column of those tables whose metadata name none; other layers have their own.
     landmarks : list of str, optional
         Columns of the reference to find places by, which have equal values in any column of the suspect;
         all columns of texts and integers by default.
@@ -99,7 +100,17 @@ def verify(
     ('match', 'ACME GmbH')
     """
     check_options("verify", options)
-    check_threads(threads)
+    check_key(key)
+    check_run(threads, progress)
+    records = _listed(records)
+    _check_records(record, records)
+    if isinstance(landmarks, str):
+        raise TypeError(f"landmarks is the text {landmarks!r}, and not a list of texts: use [{landmarks!r}]")
+    for name, word in {"registration": registration, "demodulator": demodulator}.items():
+        check_kind(name, word, (str,), "a text")
+    check_kind("significance", significance, (numbers.Real,), "a number")
+    check_kind("radius", radius, (numbers.Real, type(None)), "a number")
+    check_switches({"exact_displacements": exact_displacements, "show_recipients": show_recipients})
     pairs = option_pairs({"recipient": recipient, "message": message, "srs": srs}, options)
     if records is not None and (record is not None or pairs):
         given = "record" if record is not None else pairs[0][0].lower()
@@ -108,7 +119,7 @@ def verify(
     if not references:
         raise TypeError("verify() needs a reference: the map as it was before marking")
     fields = None if landmarks is None else {name.lower() for name in landmarks}
-    maps = [Map(layers, geometry, fields) for layers in references]
+    suspect, *maps = maps_of([suspect, *references], geometry, fields)
     for name in landmarks or ():
         _check_field(name, maps)
     sought = {"options": pairs, "record": record, "records": _named(records)}
@@ -122,7 +133,7 @@ def verify(
         "threads": threads,
         "progress": progress,
     }
-    compared = {"suspect": Map(suspect, geometry), "references": maps}
+    compared = {"suspect": suspect, "references": maps}
     return _meshmark.verify(compared, key, sought, settings)
 
 
@@ -134,6 +145,27 @@ def _named(records):
         return sorted(records.items())
     digits = len(str(len(records)))
     return [(f"record {number:0{digits}}", record) for number, record in enumerate(records, 1)]
+
+
+def _listed(records):
+    """Return records that may be iterated over several times."""
+    is_list = isinstance(records, Iterable) and not isinstance(records, (str, bytes, Mapping))
+    return list(records) if is_list else records
+
+
+def _check_records(record, records):
+    """Raise for what are no records."""
+    read = "read one with meshmark.Record.read"
+    if record is not None and not isinstance(record, _meshmark.Record):
+        raise TypeError(f"record is {record!r}, a {type(record).__name__}, and not a Record: {read}")
+    if not isinstance(records, (list, Mapping, type(None))):
+        raise TypeError(f"records is {records!r}, a {type(records).__name__}, and not a list or dict of Record: {read}")
+    names, values = (records.keys(), records.values()) if isinstance(records, Mapping) else ((), records or ())
+    for name in names:
+        check_kind("a name in records", name, (str,), "a text")
+    for value in values:
+        if not isinstance(value, _meshmark.Record):
+            raise TypeError(f"records has {value!r}, a {type(value).__name__}, and not a Record: {read}")
 
 
 def _check_field(name, maps):

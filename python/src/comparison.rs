@@ -3,6 +3,7 @@
 use crate::{
     errors::VerificationError, geos::PyGeos, layered_maps::LayeredMap, notebook::framed, waiting::run,
 };
+use meshmark_marking as marking;
 use meshmark_verification::{
     compare::{self as comparison, Details},
     html,
@@ -43,7 +44,16 @@ pub fn compare(
     })
 }
 
-fn of_map(name: &str, source: meshmark_marking::Error) -> VerificationError {
+fn of_map(name: &str, source: marking::Error) -> VerificationError {
+    // A comparison has no arguments that choose a CRS or layers.
+    let reason = match source {
+        marking::Error::NoCrs => "it has no CRS and all its coordinates could be degrees: give it its CRS",
+        marking::Error::MixedCrs { .. } => "its layers are not in the same CRS: compare them one by one",
+        _ => "",
+    };
+    if !reason.is_empty() {
+        return VerificationError::Uncompared { name: name.into(), reason };
+    }
     VerificationError::Map { name: Some(name.into()), source }
 }
 

@@ -48,6 +48,8 @@ pub enum VerificationError {
     Verification(verification::Error),
     /// A map of this name, or one that is missing.
     Map { name: Option<String>, source: marking::Error },
+    /// A map that cannot be compared, for this reason, with the remedy.
+    Uncompared { name: String, reason: &'static str },
 }
 
 impl From<verification::Error> for VerificationError {
@@ -67,6 +69,7 @@ impl fmt::Display for VerificationError {
         match self {
             VerificationError::Verification(error) => f.write_str(&error.text(Spelling::Keyword)),
             VerificationError::Map { name: None, source } => f.write_str(&source.text(Spelling::Keyword)),
+            VerificationError::Uncompared { name, reason } => write!(f, "{name}: {reason}"),
             VerificationError::Map { name: Some(name), source } => {
                 write!(f, "{name}: {}", source.text(Spelling::Keyword))
             }
@@ -85,7 +88,7 @@ impl From<VerificationError> for PyErr {
             VerificationError::Map { source: marking::Error::LostBase { .. }, .. } => {
                 RecordError::new_err(text)
             }
-            VerificationError::Map { .. } => MapError::new_err(text),
+            VerificationError::Map { .. } | VerificationError::Uncompared { .. } => MapError::new_err(text),
             VerificationError::Verification(error) => match error {
                 Core(_) | Contradiction { .. } | PaperOfFingerprint | SeveralReferences => {
                     OptionError::new_err(text)

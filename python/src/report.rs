@@ -39,10 +39,19 @@ impl Report {
         self.0.shows_key()
     }
 
-    /// The recipient whose copy was looked for, or was found among records; None where nobody is named.
+    /// The only one of `recipients`; None where there is none, or several.
     #[getter]
     fn recipient(&self) -> Option<&str> {
-        self.0.parameters.recipient.as_deref()
+        match self.0.recipients()[..] {
+            [only] => Some(only),
+            _ => None,
+        }
+    }
+
+    /// The recipient whose copy was looked for, or of many records all whose records match, the best one first.
+    #[getter]
+    fn recipients(&self) -> Vec<&str> {
+        self.0.recipients()
     }
 
     /// The message that was read, hexadecimal; None of a fingerprint.
@@ -142,7 +151,11 @@ impl Report {
     }
 
     fn __repr__(&self) -> String {
-        let recipient = self.recipient().map_or(String::new(), |name| format!(", recipient {name:?}"));
+        let recipient = match &self.recipients()[..] {
+            [] => String::new(),
+            [only] => format!(", recipient {only:?}"),
+            several => format!(", recipients {several:?}"),
+        };
         let p = self.0.p_value_log10.map_or(String::new(), |p| format!(", p-value {}", power_of_ten(p)));
         format!("<meshmark.Report {}{recipient}{p}>", self.verdict())
     }

@@ -6,6 +6,7 @@ import unittest
 
 import meshmark
 import shapely
+import shapely.affinity
 
 from test_marking import FIXTURES, Folder, layers_of, town
 from test_verification import COMMAND, marked, sections_of
@@ -41,6 +42,32 @@ class Comparisons(Folder):
             meshmark.compare(reference, other)
         with self.assertRaisesRegex(meshmark.MapError, "in EPSG:3857 and the reference in EPSG:3067"):
             meshmark.compare(reference, reference.to_crs("EPSG:3857"))
+
+    def test_layers_correspond_by_name_or_are_the_only_ones(self):
+        reference = town()
+        other = {"houses": reference}
+        self.assertEqual(meshmark.compare(reference, other).max_m, 0.0)
+        roads = reference.geometry.boundary.to_frame("geometry")
+        for marked in ({"houses": reference, "roads": roads}, {"roads": roads, "houses": reference}):
+            self.assertEqual(meshmark.compare({"houses": reference, "roads": roads}, marked).max_m, 0.0)
+        with self.assertRaisesRegex(meshmark.MapError, 'same name: "roads" of the reference, and "streets" of the marked map;'):
+            meshmark.compare({"houses": reference, "roads": roads}, {"houses": reference, "streets": roads})
+        with self.assertRaisesRegex(meshmark.MapError, '400 geometries in layer "roads" and the marked map 399'):
+            meshmark.compare({"houses": reference, "roads": roads}, {"houses": reference, "roads": roads.iloc[1:]})
+
+    def test_arguments_that_are_refused(self):
+        reference = town()
+        for precision in (0, -1, float("nan"), float("inf")):
+            with self.assertRaisesRegex(meshmark.OptionError, "precision=.* is not legal: give a number greater than 0"):
+                meshmark.compare(reference, reference, precision=precision)
+        with self.assertRaisesRegex(TypeError, "precision is '1', a str, and not a number"):
+            meshmark.compare(reference, reference, precision="1")
+        degrees = shapely.affinity.scale
+        small = reference.geometry.set_crs(None, allow_override=True).apply(lambda house: degrees(house, 1e-3, 1e-3, origin=(0, 0)))
+        with self.assertRaises(meshmark.MapError) as refused:
+            meshmark.compare(small, small)
+        self.assertRegex(str(refused.exception), "the reference: it has no CRS .*: give it its CRS")
+        self.assertNotIn("srs", str(refused.exception))
 
     def test_a_page_for_a_notebook(self):
         reference = town()

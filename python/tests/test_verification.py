@@ -306,6 +306,72 @@ class Refused(Folder):
         self.check(TypeError, "needs a reference", self.copy, [], self.key)
         self.check(ValueError, "threads=0", *maps, self.record, threads=0)
 
+    def test_arguments_of_another_type(self):
+        maps = (self.copy, self.town, self.key)
+        read = "and not a Record: read one with meshmark.Record.read"
+        self.check(TypeError, f"record is 'acme.json', a str, {read}", *maps, "acme.json")
+        self.check(TypeError, "record is {.*}, a dict, and not a Record", *maps, json.loads(self.record.to_json()))
+        self.check(TypeError, "records is 'records', a str, and not a list or dict of Record", *maps, records="records")
+        self.check(TypeError, "records is 3, a int, and not a list or dict", *maps, records=3)
+        self.check(TypeError, "records is <.*Record.*>, a Record, and not a list", *maps, records=self.record)
+        self.check(TypeError, f"records has 'acme.json', a str, {read}", *maps, records=["acme.json"])
+        self.check(TypeError, f"records has None, a NoneType, {read}", *maps, records={"acme.json": None})
+        self.check(TypeError, "a name in records is 1, a int, and not a text", *maps, records={1: self.record})
+        self.check(TypeError, "key is a str, and not a Key: .*Key.read", self.copy, self.town, "key.json", self.record)
+        self.check(TypeError, "landmarks is the text 'number', .* use \\['number'\\]", *maps, landmarks="number")
+        self.check(TypeError, "radius is '1', a str, and not a number", *maps, radius="1")
+        self.check(TypeError, "significance is None, a NoneType, and not a number", *maps, significance=None)
+        self.check(TypeError, "show_recipients is 'no', a str, and not True or False", *maps, show_recipients="no")
+        self.check(TypeError, "threads is '2', a str, and not a whole number", *maps, threads="2")
+        self.check(TypeError, "progress is 3, a int, and not a function", *maps, progress=3)
+        report = meshmark.verify(*maps, records=(record for record in [self.record]), exact_displacements=numpy.bool_(False))
+        self.assertTrue(report.is_match)
+
+    def test_the_recipients_are_those_whose_records_match(self):
+        reference = town(40)
+        made = list(meshmark.distribute(reference, self.key, ["A", "B", "C"]))
+        copies, records = [copy for _, copy, _ in made], {name: record for name, _, record in made}
+        half = len(reference) // 2
+        mixture = copies[0].copy()
+        mixture.loc[half:, "geometry"] = copies[1].geometry.iloc[half:]
+        report = meshmark.verify(mixture, reference, self.key, records=records)
+        self.assertEqual((report.verdict, sorted(report.recipients), report.recipient), ("match", ["A", "B"], None))
+        self.assertRegex(repr(report), "recipients ")
+        report = meshmark.verify(copies[0], reference, self.key, records=records)
+        self.assertEqual((report.recipients, report.recipient), (["A"], "A"))
+        for show in (False, True):
+            report = meshmark.verify(copies[0], reference, self.key, records=[records["C"]], show_recipients=show)
+            self.assertEqual((report.is_match, report.recipients, report.recipient), (False, [], None))
+        report = meshmark.verify(copies[0], reference, self.key, records["C"])
+        self.assertEqual((report.is_match, report.recipients, report.recipient), (False, ["C"], "C"))
+
+    def test_a_reference_has_the_crs_of_its_record(self):
+        web = self.town.to_crs("EPSG:3857")
+        copy, record = meshmark.mark(web, self.key, recipient="ACME GmbH")
+        expected = meshmark.verify(copy, web, self.key, record)
+        bare = web.set_crs(None, allow_override=True)
+        for srs in (None, "EPSG:3857"):
+            report = meshmark.verify(copy, bare, self.key, record, srs=srs)
+            self.assertEqual(report.p_value_log10, expected.p_value_log10)
+            self.assertEqual(report.to_dict()["parameters"]["crs_source"], "record")
+        self.check(meshmark.OptionError, "srs=EPSG:3067 contradicts the record", copy, bare, self.key, record, srs="EPSG:3067")
+        wrong = web.set_crs("EPSG:4326", allow_override=True)
+        with self.assertWarnsRegex(UserWarning, "the reference states EPSG:4326, and its record EPSG:3857"):
+            report = meshmark.verify(copy, wrong, self.key, record)
+        self.assertEqual(report.p_value_log10, expected.p_value_log10)
+        self.assertEqual(report.to_dict()["parameters"]["crs_of_reference"], "EPSG:4326")
+
+    def test_a_geometry_column_that_one_map_has(self):
+        wkb = pyarrow.array(self.copy.geometry.to_wkb(), pyarrow.binary())
+        table = pyarrow.table({"number": self.copy.number.tolist(), "shape": wkb})
+        report = meshmark.verify(table, self.town, self.key, self.record, geometry="shape")
+        self.assertTrue(report.is_match)
+        self.assertGreater(meshmark.compare(self.town, table, geometry="shape").rms_m, 0.01)
+        described = pyarrow.table(self.town.to_arrow(geometry_encoding="WKB", index=False))
+        self.assertTrue(meshmark.verify(table, described, self.key, self.record, geometry="shape").is_match)
+        self.check(TypeError, "geometry='form' is for tables .* no map has such a column", self.copy, self.town, self.key, geometry="form")
+        self.check(TypeError, "not one column 'form': it has number, shape", table, self.town, self.key, geometry="form")
+
     def test_maps(self):
         broken = self.town.copy()
         broken.loc[7, "geometry"] = shapely.LineString([(0, 0), (numpy.inf, 1)])

@@ -222,6 +222,44 @@ impl Report {
         Report { seconds: None, ..self }
     }
 
+    /// Returns what a reader must know where the CRS of the reference is not its own.
+    pub fn other_crs(&self) -> Option<String> {
+        let ReportParameters { crs, crs_source, crs_of_reference, .. } = &self.parameters;
+        let Some(crs) = crs.as_deref().map(printable) else {
+            return Some("the reference states none, and its units are taken as metres".into());
+        };
+        if *crs_source != Some("record") {
+            return None;
+        }
+        Some(match crs_of_reference {
+            Some(own) => format!(
+                "the reference states {}, and its record {crs}, in which it was marked: its coordinates are read as \
+                 {crs}; give the file with its CRS, or correct that",
+                printable(own)
+            ),
+            None => format!(
+                "the reference states none, and its coordinates are read as {crs}, as its record states"
+            ),
+        })
+    }
+
+    /// Returns the warning about a reference in another CRS than its record states.
+    pub fn warning(&self) -> Option<String> {
+        self.other_crs().filter(|_| self.parameters.crs_of_reference.is_some())
+    }
+
+    /// Returns the recipients whose copies were looked for, or of many records those that match, each once.
+    pub fn recipients(&self) -> Vec<&str> {
+        let Some(candidates) = &self.candidates else {
+            return self.parameters.recipient.as_deref().into_iter().collect();
+        };
+        let of_matches = candidates.list.iter().take(candidates.matches);
+        let mut names: Vec<&str> = of_matches.filter_map(|entry| entry.recipient.as_deref()).collect();
+        let mut seen = BTreeSet::new();
+        names.retain(|name| seen.insert(*name));
+        names
+    }
+
     /// Hides the names of recipients whose records were tried and do not match.
     pub fn hide_others(&mut self) {
         let Some(candidates) = &mut self.candidates else { return };
