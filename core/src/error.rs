@@ -1,6 +1,7 @@
 use crate::{
     counted,
-    options::{Code, Kind, OPTIONS, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling},
+    options::{Code, Kind, OPTIONS, PATCH_SIZE_RANGE, RECIPIENT_BITS, RecipientFault, Spelling},
+    visible,
 };
 use std::fmt;
 
@@ -30,6 +31,8 @@ pub enum Error {
     UnknownOption(String),
     RepeatedOption(&'static str),
     EmptyOption(&'static str),
+    Recipient { name: String, fault: RecipientFault },
+    AlikeRecipients { name: String },
     EmptyName { option: &'static str, value: String },
     Quotes { option: &'static str, value: String },
     IllegalValue { option: &'static str, value: String, kind: Kind },
@@ -260,6 +263,14 @@ impl Error {
             Error::EmptyOption(option) => {
                 format!("{} is empty: give it a value or leave it out", name(option))
             }
+            Error::Recipient { name, fault } => {
+                format!("{} {fault}: remove it", spelling.value("RECIPIENT", visible(name)))
+            }
+            Error::AlikeRecipients { name } => format!(
+                "the recipient \"{}\" is there in two spellings of Unicode, composed and decomposed, which would be two \
+                 recipients: write both alike",
+                visible(name)
+            ),
             Error::EmptyName { option, value } => {
                 format!("{} has an empty name between its commas", spelling.value(option, value))
             }

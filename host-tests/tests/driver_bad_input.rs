@@ -82,6 +82,28 @@ fn exactly_one_of_recipient_and_message_must_be_given() {
 }
 
 #[test]
+fn a_recipient_with_a_line_break_or_blanks_around_it_is_refused_and_a_decomposed_name_warned_of() {
+    let host = Host::new();
+    for (recipient, words) in [
+        ("ACME\nGmbH", "RECIPIENT=ACME\\u{a}GmbH has a line break or another control character: remove it"),
+        (" ACME", "RECIPIENT= ACME begins or ends with a blank: remove it"),
+    ] {
+        let option = format!("RECIPIENT={recipient}");
+        refuses(&host, &map(), &[&KEY[..], &["-oo", &option]].concat(), &[words]);
+        let written = host.create("written.gpkg", &map(), &["-dsco", &option]);
+        assert!(written.code != Some(0) && written.stderr.contains(words), "{}", written.stderr);
+        assert!(!host.path("written.gpkg").exists());
+    }
+    for (recipient, is_warned_of) in [("Cafe\u{301}", true), ("Caf\u{e9}", false)] {
+        let (copy, source) = (format!("{is_warned_of}.gpkg"), format!("MESHMARK:{}", map()));
+        let option = format!("RECIPIENT={recipient}");
+        let arguments = [&["-f", "GPKG", &copy, &source][..], &KEY, &["-oo", &option]].concat();
+        let run = host.run("ogr2ogr", &arguments);
+        assert_eq!(run.succeeds().stderr.contains("decomposed form of Unicode"), is_warned_of);
+    }
+}
+
+#[test]
 fn bad_hexadecimal_digits_are_shown() {
     let options = [&KEY[..], &["-oo", "MESSAGE=c0ffeg"]].concat();
     refuses(&Host::new(), &map(), &options, &["\"c0ffeg\"", "2 to 256 hexadecimal digits"]);

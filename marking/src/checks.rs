@@ -6,8 +6,9 @@ use meshmark_core::{
     ground::Ground,
     map::Map,
     message::{ADVISED_BITS, LEAST_IDENTIFYING_BITS, Message},
-    options::{Options, Parameters, Spelling},
+    options::{Options, Parameters, Spelling, composed},
     vertices::VertexTable,
+    visible,
 };
 
 /// A map smaller than this many tolerances would be noise after its marking.

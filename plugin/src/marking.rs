@@ -72,7 +72,7 @@ impl MarkingRequest {
     pub fn new(pairs: &[(String, String)], default_key_path: Option<String>) -> Result<Self> {
         let ours =
             pairs.iter().filter(|(name, _)| !HINTS_OF_GDAL.iter().any(|h| h.eq_ignore_ascii_case(name)));
-        let options = Options::parse(ours.map(|(name, value)| (name.as_str(), value.as_str())))?;
+        let options = Options::parse_for_marking(ours.map(|(name, value)| (name.as_str(), value.as_str())))?;
         let subject = options.subject.clone().ok_or(Error::NoSubject)?;
         let key_path = options.key_path.clone().or(default_key_path).ok_or(Error::NoKey)?;
         let (key, exposed) = read_key(&key_path)?;

@@ -72,6 +72,8 @@ def distribute(
     twice = [name for number, name in enumerate(recipients) if name in recipients[:number]]
     if twice:
         raise ValueError(f"recipient {twice[0]!r} is named twice: name every recipient once")
+    for text in _meshmark.check_recipients([name for _, name in subjects]):
+        warnings.warn(text, stacklevel=2)
     pairs = option_pairs({"srs": srs}, options)
     map = Sources(layers, geometry)
     settings = {"threads": threads, "progress": progress}

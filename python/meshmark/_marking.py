@@ -64,9 +64,12 @@ def mark(
     check_options("mark", options)
     if (recipient is None) == (message is None):
         raise TypeError("mark() needs a recipient or a message, and not both")
-    check_threads(threads)
+    check_key(key)
+    check_run(threads, progress)
     pairs = option_pairs({"srs": srs}, options)
     subject = option_pairs({"recipient": recipient, "message": message}, {})
+    for text in _meshmark.check_recipients([name for option, name in subject if option == "RECIPIENT"]):
+        warnings.warn(text, stacklevel=2)
     map = Sources(layers, geometry)
     settings = {"threads": threads, "progress": progress}
     [(moved, record)], texts = _meshmark.mark(map.columns, key, pairs, subject, _geos, settings)

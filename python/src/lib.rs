@@ -28,6 +28,7 @@ fn _meshmark(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<report::Report>()?;
     module.add_class::<comparison::Comparison>()?;
     module.add_function(wrap_pyfunction!(marking::mark, module)?)?;
+    module.add_function(wrap_pyfunction!(marking::check_recipients, module)?)?;
     module.add_function(wrap_pyfunction!(verification::verify, module)?)?;
     module.add_function(wrap_pyfunction!(comparison::compare, module)?)
 }

@@ -74,6 +74,13 @@ pub fn mark<'py>(
     Ok((copies.into_iter().map(|(layers, record)| (of_layers(layers), record)).collect(), warnings))
 }
 
+/// Check the names of the recipients of new marks, and return warnings about them.
+#[pyfunction]
+pub fn check_recipients(names: Vec<String>) -> PyResult<Vec<String>> {
+    options::check_recipients(&names).map_err(of_options)?;
+    Ok(names.iter().filter_map(|name| marking::spelling_warning(name)).collect())
+}
+
 /// Marks a map with each of these options, which differ in their subjects alone.
 fn marked(
     layers: &[Layer],

@@ -40,6 +40,15 @@ class Distribution(Folder):
         ]:
             with self.assertRaisesRegex(error, text):
                 meshmark.distribute(reference, self.key, recipients)
+        for recipients, text in [
+            (["A", "B\n"], "recipient=B.* has a line break or another control character: remove it"),
+            ([" A"], "recipient= A begins or ends with a blank: remove it"),
+            (["Caf\u00e9", "Cafe\u0301"], "is there in two spellings of Unicode"),
+        ]:
+            with self.assertRaisesRegex(meshmark.OptionError, text):
+                meshmark.distribute(reference, self.key, recipients)
+        with self.assertWarnsRegex(UserWarning, "the decomposed form of Unicode"):
+            meshmark.distribute(reference, self.key, ["A", "Cafe\u0301"])
         self.assertEqual(list(meshmark.distribute(reference, self.key, [])), [])
         with self.assertRaisesRegex(TypeError, "distribute\\(\\) has no option colour"):
             meshmark.distribute(reference, self.key, ["A"], colour="red")

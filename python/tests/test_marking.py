@@ -220,6 +220,9 @@ class Refused(Folder):
         self.refused(TypeError, "recipient is nan, a float", frame, recipient=float("nan"))
         self.refused(TypeError, "geometry='nix' is for tables", frame, geometry="nix")
         self.refused(ValueError, "threads=0", frame, threads=0)
+        self.refused(meshmark.OptionError, "begins or ends with a blank: remove it", frame, recipient="ACME ")
+        with self.assertWarnsRegex(UserWarning, "the decomposed form of Unicode"):
+            meshmark.mark(frame, self.key, recipient="Cafe\u0301")
         self.refused(meshmark.OptionError, "srs=EPSG:nowhere is not", town(crs=None), srs="EPSG:nowhere")
         self.refused(meshmark.MapError, "EPSG:3067.*srs=EPSG:3857 is another", frame, srs="EPSG:3857")
 

@@ -4,7 +4,7 @@ use crate::{Error, Result, inputs::texts};
 use der::DateTime;
 use meshmark_core::recorded::Recorded;
 use meshmark_dataset::{file_digest, formats::Format};
-use meshmark_verification::{verify::ReadRecord, words::printable};
+use meshmark_verification::words::printable;
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
@@ -57,22 +57,36 @@ pub enum State {
     Absent,
 }
 
-/// Lists the copies of which a folder has the records, in the order of recipient, edition and record.
-/// `warn` receives the names of files that are no records.
+/// The copies of which a folder has the records, and the errors of those that are missing from the list.
+pub struct Index {
+    /// The copies, in the order of recipient, edition and record.
+    pub copies: Vec<IndexedCopy>,
+    /// One error for each record or copy that cannot be read.
+    pub faults: Vec<Error>,
+}
+
+/// Lists the copies of which a folder has the records. `warn` receives the names of files that are no
+/// records.
 ///
 /// # Errors
-/// Fails on a folder or a file that is unreadable, on a damaged record, and where there is no record.
-pub fn index(folder: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<IndexedCopy>> {
-    let records = texts::records(folder, warn)?;
+/// Fails on a folder that is unreadable, and where there is no record.
+pub fn index(folder: &Path, warn: &mut dyn FnMut(&str)) -> Result<Index> {
+    let records = texts::each_record(folder, warn)?;
     if records.is_empty() {
         return Err(Error::NothingListed { folder: folder.into() });
     }
     let maps = maps(folder)?;
-    let indexed = |(path, read): (PathBuf, ReadRecord)| indexed(&path, &read.record, &maps);
-    let mut copies = records.into_iter().map(indexed).collect::<Result<Vec<_>>>()?;
-    copies
+    let mut index = Index { copies: Vec::new(), faults: Vec::new() };
+    for record in records {
+        match record.and_then(|(path, read)| indexed(&path, &read.record, &maps)) {
+            Ok(copy) => index.copies.push(copy),
+            Err(fault) => index.faults.push(fault),
+        }
+    }
+    index
+        .copies
         .sort_by_cached_key(|copy| [&copy.recipient, &copy.edition_sha256, &copy.record].map(String::clone));
-    Ok(copies)
+    Ok(index)
 }
 
 /// Returns the index as CSV (RFC 4180), with a header.

@@ -87,6 +87,33 @@ fn a_folder_that_is_missing_or_has_no_record_or_a_damaged_one_is_refused() {
 }
 
 #[test]
+fn what_cannot_be_read_is_named_and_the_rest_is_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for name in ["a.json", "z.json"] {
+        write(&path(name), &[]);
+    }
+    fs::write(path("damaged.json"), "{\"meshmark_record\": 2}").unwrap();
+    let (code, text) = records(folder.path());
+    assert_eq!(code, Some(2), "{text}");
+    let (table, faults) = text.split_at(text.find("meshmark: ").unwrap());
+    assert_eq!(rows(table).into_keys().collect::<Vec<_>>(), ["a.json", "z.json"]);
+    assert!(faults.lines().count() == 1 && faults.contains("damaged.json: malformed record"), "{faults}");
+
+    fs::remove_file(path("damaged.json")).unwrap();
+    std::os::unix::fs::symlink("nowhere.json", path("lost.json")).unwrap();
+    let (made, text) = ended(Command::new("mkfifo").arg(path("pipe.json")).output().unwrap());
+    assert_eq!(made, Some(0), "{text}");
+    fs::create_dir(path("folder.json")).unwrap();
+    let (code, text) = records(folder.path());
+    assert_eq!(code, Some(5), "{text}");
+    let (table, faults) = text.split_at(text.find("meshmark: ").unwrap());
+    assert_eq!(rows(table).len(), 2);
+    assert!(faults.contains("lost.json") && faults.contains("pipe.json"), "{faults}");
+    assert_eq!(faults.lines().count(), 2, "{faults}");
+}
+
+#[test]
 fn names_are_given_to_programs_as_they_are_and_do_not_control_a_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let name = "AC\u{1b}[2J\u{202e}ME";

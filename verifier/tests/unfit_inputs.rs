@@ -51,6 +51,28 @@ fn a_pipe_that_nobody_writes_to_is_refused_wherever_it_is_given() {
 }
 
 #[test]
+fn a_link_to_nothing_and_a_pipe_among_records_are_named() {
+    let vendor = vendor();
+    let path = |name: &str| vendor.path(&format!("records/{name}"));
+    std::os::unix::fs::symlink("nowhere.json", path("lost.json")).unwrap();
+    let (code, text) = ended(Command::new("mkfifo").arg(path("pipe.json")).output().unwrap());
+    assert_eq!(code, Some(0), "{text}");
+    let verify = ["verify", "--key", "key.json", "--reference", "map.gpkg", "--records", "records"];
+    let (code, text) = vendor.run(&[&verify[..], &["suspect.gpkg"]].concat());
+    assert_eq!(code, Some(0), "{text}");
+    for name in ["lost.json", "pipe.json"] {
+        assert!(text.contains(&format!("{name} is skipped: it cannot be read")), "{text}");
+    }
+    let (code, text) = vendor.deposit_and("new.deposit", &[]);
+    assert!(code == Some(5) && text.contains("lost.json cannot be read"), "{code:?} {text}");
+    let (code, text) = vendor.run(&[&verify[..], &["--bundle", "case.zip", "suspect.gpkg"]].concat());
+    assert!(
+        code == Some(5) && text.contains(".json") && !vendor.path("case.zip").exists(),
+        "{code:?} {text}"
+    );
+}
+
+#[test]
 fn a_key_or_a_record_that_is_not_there_is_an_unreadable_input() {
     let vendor = vendor();
     for of in ["key.json", "map.gpkg", "records/acme.json", "suspect.gpkg"] {

@@ -5,6 +5,7 @@ mod creation;
 mod list;
 mod listing;
 mod parameters;
+mod recipient;
 mod subject;
 mod table;
 mod values;
@@ -14,6 +15,7 @@ pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
 pub use parameters::{AmplitudeOf, Code, Laplacian, Parameters, Rigidity};
 pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
+pub use recipient::{RecipientFault, check_recipients, composed, recipient_fault};
 pub use subject::Subject;
 pub use table::{
     CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PART_SIZE, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,
@@ -106,6 +108,16 @@ impl Options {
             sheets: values.text("SHEETS")?,
             part_size,
         })
+    }
+
+    /// Parses name-value pairs as [`Options::parse`] does, for a new mark.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Options::parse`] and [`check_recipients`].
+    pub fn parse_for_marking<'a>(pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self> {
+        let options = Options::parse(pairs)?;
+        check_recipients(options.subject.as_ref().and_then(Subject::recipient).as_slice())?;
+        Ok(options)
     }
 
     /// Parses name-value pairs as [`Options::parse`] does, for marks of recipients that are named

@@ -37,7 +37,7 @@ use meshmark_detection::{
 };
 use meshmark_marking::LeftOut;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The result of one verification. docs/report.schema.json describes its JSON.
 #[derive(Debug, Clone, Serialize)]

@@ -3,7 +3,7 @@
 use super::{JSON, MANIFEST, PAGE};
 use crate::{
     Error, Result,
-    inputs::{digests, texts::possible_records, versions::versions_and_program},
+    inputs::{digests, plain, texts::possible_records, versions::versions_and_program},
 };
 use meshmark_core::{counted, hex};
 use meshmark_dataset::file_digest;
@@ -146,8 +146,10 @@ fn digest(role: Role, path: &Path) -> Result<String> {
         return Ok(digests::digest(path)?.digest);
     }
     let files = possible_records(path)?;
-    let digested =
-        |file: &PathBuf| file_digest(file).map_err(|source| Error::Undigested { path: file.clone(), source });
+    let digested = |file: &PathBuf| {
+        plain::check("record", file)?;
+        file_digest(file).map_err(|source| Error::Undigested { path: file.clone(), source })
+    };
     let mut found = files.iter().map(digested).collect::<Result<Vec<_>>>()?;
     found.sort();
     let all = hex::encode(&Sha256::digest(found.join("\n")));

@@ -242,7 +242,7 @@ pub(super) struct CompareArgs {
     #[arg(long)]
     pub(super) layers: Option<String>,
     /// Grid of the marked map, CRS units: overlaps up to a cell of it count as slivers
-    #[arg(long)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub(super) precision: Option<f64>,
     /// Print the comparison as one JSON object
     #[arg(long)]

@@ -20,7 +20,7 @@ use meshmark_verification::{
 use meshmark_verifier::{
     Error, Result,
     compare::{compare, compared_files},
-    copies_index::{self, IndexedCopy},
+    copies_index::{self, Index, IndexedCopy},
     distribute,
     inputs::{gdal_failures, texts},
     outputs::{Format, NewFile, ReportFile},
@@ -49,7 +49,7 @@ pub fn run() -> u8 {
         Subcommands::PackageFiles { folder } => write_package_files(&folder).map(|()| DONE),
         Subcommands::Distribute(args) => run_distribute(*args).map(|()| DONE),
         Subcommands::Plan(args) => plan_sheets(&args).map(|()| DONE),
-        Subcommands::Records { folder } => list_copies(&folder).map(|()| DONE),
+        Subcommands::Records { folder } => list_copies(&folder),
     };
     result.unwrap_or_else(|error| {
         warn(&error.to_string());
@@ -130,11 +130,13 @@ fn plan_sheets(args: &PlanArgs) -> Result<()> {
 }
 
 /// Prints the table of copies: as it is for programs, and so that names cannot control it for a
-/// terminal.
-fn list_copies(folder: &Path) -> Result<()> {
-    let mut copies = copies_index::index(folder, &mut warn)?;
+/// terminal. Records that cannot be listed are named, and the exit code is that of the first one.
+fn list_copies(folder: &Path) -> Result<u8> {
+    let Index { mut copies, faults } = copies_index::index(folder, &mut warn)?;
     if stdout().is_terminal() {
         copies.iter_mut().for_each(IndexedCopy::make_printable);
     }
-    print(&copies_index::to_csv(&copies))
+    print(&copies_index::to_csv(&copies))?;
+    faults.iter().for_each(|fault| warn(&fault.to_string()));
+    Ok(faults.first().map_or(DONE, |fault| fault.exit_code() as u8))
 }

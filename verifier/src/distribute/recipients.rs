@@ -2,8 +2,16 @@
 
 use crate::{Error, Result, inputs::plain};
 use csv::{ReaderBuilder, StringRecord, Trim};
-use meshmark_core::visible;
-use std::{collections::BTreeSet, io::Read, path::Path};
+use meshmark_core::{
+    options::{composed, recipient_fault},
+    visible,
+};
+use meshmark_marking::spelling_warning;
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    io::Read,
+    path::Path,
+};
 
 const HEADER: &str = "recipient";
 
@@ -60,24 +68,36 @@ pub fn read(path: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<String>> {
             row.len()
         )));
     }
-    let (mut seen, mut recipients) = (BTreeSet::new(), Vec::new());
+    let (mut seen, mut recipients) = (BTreeMap::new(), Vec::new());
     for (line, row) in rows.iter().skip(usize::from(column.is_some())) {
         let recipient = row.get(column.unwrap_or(0)).unwrap_or_default();
         if recipient.is_empty() {
             return Err(bad(format!("has no recipient in line {line}: fill it in, or remove the line")));
         }
-        if recipient.contains(char::is_control) {
+        if let Some(fault) = recipient_fault(recipient) {
             return Err(bad(format!(
-                "has a line break or another control character in the recipient of line {line}: close its quotes, and \
-                 save the list as UTF-8"
+                "has in line {line} a recipient that {fault}: close its quotes, and save the list as UTF-8"
             )));
         }
-        match seen.insert(recipient.to_string()) {
-            true => recipients.push(recipient.to_string()),
-            false => warn(&format!(
+        match seen.entry(composed(recipient)) {
+            Entry::Vacant(place) => {
+                if let Some(text) = spelling_warning(recipient) {
+                    warn(&format!("{name}, line {line}: {text}"));
+                }
+                place.insert(recipient.to_string());
+                recipients.push(recipient.to_string());
+            }
+            Entry::Occupied(first) if first.get() == recipient => warn(&format!(
                 "{name}: \"{}\" is there again in line {line}, and gets one copy",
                 visible(recipient)
             )),
+            Entry::Occupied(_) => {
+                return Err(bad(format!(
+                    "has \"{}\" in line {line} in another spelling of Unicode than above (composed or decomposed), \
+                     which would be two recipients: write both alike",
+                    visible(recipient)
+                )));
+            }
         }
     }
     match recipients.is_empty() {
@@ -239,11 +259,12 @@ mod tests {
             (b"#\x0c#client\x0c#", "begins with \"#\\u{c}#client\\u{c}#\" in line 1"),
             (b"id,recipient\n1,A\n2,\n", "no recipient in line 3"),
             (b"A\n\xff\xfe\n", "is not UTF-8 in line 2"),
-            (b"A\n\"B\nC\n", "control character in the recipient of line 2"),
+            ("Caf\u{e9}\nA\nCafe\u{301}\n".as_bytes(), "in line 3 in another spelling of Unicode"),
+            (b"A\n\"B\nC\n", "in line 2 a recipient that has a line break or another control"),
             (b"A\rB\r\rC,D\r", "2 columns in line 4"),
             (b"A\r\nB\r\n\r\nC,D\r\n", "2 columns in line 4"),
-            (b"recipient\r\"a\rb\"", "control character in the recipient of line 2"),
-            (b"A\0C\0", "control character in the recipient of line 1"),
+            (b"recipient\r\"a\rb\"", "in line 2 a recipient that has a line break or another control"),
+            (b"A\0C\0", "in line 1 a recipient that has a line break or another control"),
         ] {
             let (_, found) = parse(text);
             assert!(found.contains(error), "{}: {found}", String::from_utf8_lossy(text));

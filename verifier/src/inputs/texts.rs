@@ -109,7 +109,8 @@ pub(crate) fn possible_records(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in folder.read_dir().map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) && path.is_file() {
+        // A link to nothing and a pipe cannot be read, and whoever wants all records has to know.
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) && !path.is_dir() {
             files.push(path);
         }
     }
@@ -117,18 +118,35 @@ pub(crate) fn possible_records(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// A record of a folder, with its path, or the error of a file that cannot be read or is a malformed record.
+pub type OneRecord = Result<(PathBuf, ReadRecord)>;
+
 /// Reads all records of a folder. `warn` receives the names of files that are no records, among which
 /// a record that was damaged is none.
 ///
 /// # Errors
 /// Fails on an unreadable file, and on a record that is malformed.
 pub fn records(folder: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<(PathBuf, ReadRecord)>> {
+    each_record(folder, warn)?.into_iter().collect()
+}
+
+/// Reads the records of a folder, each by itself. `warn` is as in [`records`].
+///
+/// # Errors
+/// Fails when the folder cannot be read.
+pub fn each_record(folder: &Path, warn: &mut dyn FnMut(&str)) -> Result<Vec<OneRecord>> {
     let mut records = Vec::new();
     for path in possible_records(folder)? {
-        let text = small("record", &path)?;
+        let text = match small("record", &path) {
+            Ok(text) => text,
+            Err(unread) => {
+                records.push(Err(unread));
+                continue;
+            }
+        };
         match parsed(&text) {
-            Ok(read) => records.push((path, read)),
-            Err(bad) if claims_to_be_record(&text) => return Err(of_record(&path, bad)),
+            Ok(read) => records.push(Ok((path, read))),
+            Err(bad) if claims_to_be_record(&text) => records.push(Err(of_record(&path, bad))),
             Err(_) => warn(&format!("{} is no record, and is left out", path.display())),
         }
     }
