@@ -75,8 +75,8 @@ impl MapData {
         kinds: impl IntoIterator<Item = ChainKind>,
     ) -> Result<(Self, Vec<u32>)> {
         let (vertices, indices) = VertexTable::indexed(coords)?;
-        let segments = segments(&indices, starts);
         let polygon_roots = polygon_roots(&indices, starts, kinds, vertices.len());
+        let segments = segments(&indices, starts);
         Ok((MapData { segments, polygon_roots, ..Self::of_points(vertices) }, indices))
     }
 
