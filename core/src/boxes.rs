@@ -18,6 +18,7 @@ use crate::{
     submap::Submap,
     vertices::VertexTable,
 };
+use std::sync::Arc;
 
 /// The share by which distances from a border are taken longer than vertices move, so that things on
 /// either side keep a gap.
@@ -28,7 +29,7 @@ pub(crate) struct Boxes<'a> {
     map: Map<'a>,
     /// For every box the canonical indices of its vertices, ascending.
     members: Vec<Vec<u32>>,
-    plan: BoxPlan,
+    plan: Arc<BoxPlan>,
     /// For every vertex whether it stays in place.
     is_anchor: Vec<bool>,
     /// For every box the segments between boxes that may pass through it.
@@ -80,7 +81,7 @@ impl<'a> Boxes<'a> {
         if parameters.shape != Rigidity::Free {
             anchor_divided_bodies(&map, &plan, &mut is_anchor);
         }
-        Boxes { map, members, plan, is_anchor, crossing }
+        Boxes { map, members, plan: Arc::new(plan), is_anchor, crossing }
     }
 
     /// Returns how many boxes there are.
@@ -91,6 +92,11 @@ impl<'a> Boxes<'a> {
     /// Returns the map that was cut.
     pub fn map(&self) -> &Map<'a> {
         &self.map
+    }
+
+    /// Returns the plan by which it was cut.
+    pub fn plan(&self) -> Arc<BoxPlan> {
+        self.plan.clone()
     }
 
     /// Returns the number of vertices of a box.

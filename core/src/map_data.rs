@@ -152,6 +152,13 @@ impl MapData {
         Ok(MapData { vertices, segments, polygon_roots: joined.roots(), areas, labels, polylines })
     }
 
+    /// Releases segments and polygon groups, which only the marking of a map and the reading of its mark
+    /// need.
+    pub fn release_mesh(&mut self) {
+        self.segments = Vec::new();
+        self.polygon_roots = Vec::new();
+    }
+
     /// Returns the map as input of the algorithm; `ground` has the metres of the mark, `measure`
     /// those of limits and figures.
     pub fn on<'a>(&'a self, ground: &'a Ground, measure: &'a Ground) -> Map<'a> {
