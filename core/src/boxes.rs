@@ -18,6 +18,7 @@ use crate::{
     submap::Submap,
     vertices::VertexTable,
 };
+use std::sync::Arc;
 
 /// The share by which distances from a border are taken longer than vertices move, so that things on
 /// either side keep a gap.
@@ -28,8 +29,7 @@ pub(crate) struct Boxes<'a> {
     map: Map<'a>,
     /// For every box the canonical indices of its vertices, ascending.
     members: Vec<Vec<u32>>,
-    /// For every vertex its box.
-    box_of: Vec<u32>,
+    plan: Arc<BoxPlan>,
     /// For every vertex whether it stays in place.
     is_anchor: Vec<bool>,
     /// For every box the segments between boxes that may pass through it.
@@ -50,22 +50,26 @@ impl<'a> Boxes<'a> {
     /// Cuts a map into boxes of about `part_size` vertices.
     pub fn new(map: Map<'a>, part_size: usize, parameters: &Parameters) -> Self {
         let plan = BoxPlan::new(map.vertices, part_size, map.ground.x_scale(map.vertices.centre()[1]));
-        let box_of: Vec<u32> = map.vertices.coords().iter().map(|place| plan.box_at(*place)).collect();
-        let mut members = vec![Vec::new(); plan.len()];
-        (0..).zip(&box_of).for_each(|(v, number)| members[*number as usize].push(v));
-        let is_near = |v: u32, by_m: f64| {
-            let reach = map.measure.metres_per_unit(map.at(v)).map(|scale| by_m / scale.max(1e-9));
-            plan.is_near_border(box_of[v as usize], map.at(v), reach)
+        let is_near = |number: u32, at: [f64; 2], by_m: f64| {
+            let reach = map.measure.metres_per_unit(at).map(|scale| by_m / scale.max(1e-9));
+            plan.is_near_border(number, at, reach)
         };
-        let vertices = 0..box_of.len() as u32;
-        let mut is_anchor: Vec<bool> =
-            vertices.map(|v| is_near(v, MARGIN * parameters.tolerance_m)).collect();
+        let mut members = vec![Vec::new(); plan.len()];
+        let mut is_anchor = Vec::with_capacity(map.vertices.len());
+        for (v, &at) in (0..).zip(map.vertices.coords()) {
+            let number = plan.box_at(at);
+            members[number as usize].push(v);
+            is_anchor.push(is_near(number, at, MARGIN * parameters.tolerance_m));
+        }
+        members.iter_mut().for_each(Vec::shrink_to_fit);
         let mut crossing = vec![Vec::new(); plan.len()];
         let mut passed = Vec::new();
         for &[a, b] in map.segments {
-            let is_crossing = box_of[a as usize] != box_of[b as usize];
+            let numbers = [a, b].map(|v| plan.box_at(map.at(v)));
+            let is_crossing = numbers[0] != numbers[1];
             // What touches a segment is at most this far away, and may be in another box.
-            if is_crossing || [a, b].into_iter().any(|v| is_near(v, 2.0 * JUNCTION_M)) {
+            let mut ends = [a, b].into_iter().zip(numbers);
+            if is_crossing || ends.any(|(v, number)| is_near(number, map.at(v), 2.0 * JUNCTION_M)) {
                 [a, b].into_iter().for_each(|v| is_anchor[v as usize] = true);
             }
             if is_crossing {
@@ -75,9 +79,9 @@ impl<'a> Boxes<'a> {
             }
         }
         if parameters.shape != Rigidity::Free {
-            anchor_divided_bodies(&map, &box_of, &mut is_anchor);
+            anchor_divided_bodies(&map, &plan, &mut is_anchor);
         }
-        Boxes { map, members, box_of, is_anchor, crossing }
+        Boxes { map, members, plan: Arc::new(plan), is_anchor, crossing }
     }
 
     /// Returns how many boxes there are.
@@ -88,6 +92,11 @@ impl<'a> Boxes<'a> {
     /// Returns the map that was cut.
     pub fn map(&self) -> &Map<'a> {
         &self.map
+    }
+
+    /// Returns the plan by which it was cut.
+    pub fn plan(&self) -> Arc<BoxPlan> {
+        self.plan.clone()
     }
 
     /// Returns the number of vertices of a box.
@@ -103,7 +112,7 @@ impl<'a> Boxes<'a> {
 
     /// Cuts a box out of the map.
     pub fn cut(&self, number: usize) -> BoxMap {
-        let is_inside = |v: u32| self.box_of[v as usize] == number as u32;
+        let is_inside = |v: u32| self.plan.box_at(self.map.at(v)) == number as u32;
         let crossing = &self.crossing[number];
         let others = crossing.iter().flatten().copied().filter(|&v| !is_inside(v));
         let mut indices: Vec<u32> = self.members[number].iter().copied().chain(others).collect();
@@ -123,13 +132,15 @@ impl<'a> Boxes<'a> {
 }
 
 /// Makes anchors of all vertices of the polygon groups that may be bodies and are in several boxes.
-fn anchor_divided_bodies(map: &Map, box_of: &[u32], is_anchor: &mut [bool]) {
-    let (mut sizes, mut is_divided) = (vec![0u32; box_of.len()], vec![false; box_of.len()]);
-    for (number, &root) in box_of.iter().zip(map.polygon_roots) {
-        sizes[root as usize] += 1;
-        is_divided[root as usize] |= *number != box_of[root as usize];
+fn anchor_divided_bodies(map: &Map, plan: &BoxPlan, is_anchor: &mut [bool]) {
+    // A size that does not fit is that of a group which is too large for a body.
+    let (mut sizes, mut is_divided) = (vec![0u8; is_anchor.len()], vec![false; is_anchor.len()]);
+    const { assert!(bodies::MOST_VERTICES < u8::MAX as usize) };
+    for (&at, &root) in map.vertices.coords().iter().zip(map.polygon_roots) {
+        sizes[root as usize] = sizes[root as usize].saturating_add(1);
+        is_divided[root as usize] |= plan.box_at(at) != plan.box_at(map.at(root));
     }
     for (is_anchor, &root) in is_anchor.iter_mut().zip(map.polygon_roots) {
-        *is_anchor |= is_divided[root as usize] && sizes[root as usize] as usize <= bodies::MOST_VERTICES;
+        *is_anchor |= is_divided[root as usize] && usize::from(sizes[root as usize]) <= bodies::MOST_VERTICES;
     }
 }

@@ -33,6 +33,7 @@ impl DisjointSets {
 
     /// Returns the root of every number.
     pub fn roots(mut self) -> Vec<u32> {
-        (0..self.0.len() as u32).map(|v| self.root(v)).collect()
+        (0..self.0.len() as u32).for_each(|v| self.0[v as usize] = self.root(v));
+        self.0
     }
 }

@@ -22,12 +22,43 @@ impl Spread {
     /// Summarises values, none of which is NaN.
     pub fn summarise(mut values: Vec<f64>) -> Self {
         values.par_sort_unstable_by(f64::total_cmp);
-        let count = values.len().max(1) as f64;
-        // The sum of nothing would be -0.
-        let mean = |of: fn(f64) -> f64| values.iter().fold(0.0, |sum, v| sum + of(*v)) / count;
-        let at =
-            |percent: usize| values.len().checked_sub(1).map_or(0.0, |last| values[last * percent / 100]);
-        Spread { mean: mean(|v| v), root_mean_square: mean(|v| v * v).sqrt(), p99: at(99), max: at(100) }
+        let mut spread = SpreadOfSorted::new(values.len());
+        values.into_iter().for_each(|value| spread.add(value));
+        spread.spread()
+    }
+}
+
+/// The spread of so many values, which are added in ascending order.
+pub(crate) struct SpreadOfSorted {
+    count: usize,
+    added: usize,
+    sum: f64,
+    sum_of_squares: f64,
+    p99: f64,
+    max: f64,
+}
+
+impl SpreadOfSorted {
+    pub fn new(count: usize) -> Self {
+        SpreadOfSorted { count, added: 0, sum: 0.0, sum_of_squares: 0.0, p99: 0.0, max: 0.0 }
+    }
+
+    /// Adds the next value.
+    pub fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.sum_of_squares += value * value;
+        if self.added == (self.count - 1) * 99 / 100 {
+            self.p99 = value;
+        }
+        self.max = value;
+        self.added += 1;
+    }
+
+    /// Returns the spread, after the last value.
+    pub fn spread(self) -> Spread {
+        let count = self.count.max(1) as f64;
+        let [mean, mean_square] = [self.sum, self.sum_of_squares].map(|sum| sum / count);
+        Spread { mean, root_mean_square: mean_square.sqrt(), p99: self.p99, max: self.max }
     }
 }
 
@@ -99,11 +130,19 @@ pub struct Displacement {
 impl Displacement {
     /// Measures the displacement of the vertices of a map to `moved`, in canonical order.
     pub fn between(vertices: &VertexTable, moved: &[[f64; 2]], measure: &Ground) -> Self {
-        let metres = |(from, to): (&[f64; 2], &[f64; 2])| {
-            let [dx, dy] = measure.metres_between(*from, *to);
-            dx.hypot(dy)
-        };
-        let spread = Spread::summarise(vertices.coords().iter().zip(moved).map(metres).collect());
+        let distances =
+            vertices.coords().iter().zip(moved).map(|(&from, &to)| Self::of_vertex(from, to, measure));
+        Self::new(&Spread::summarise(distances.collect()))
+    }
+
+    /// Returns the displacement of a vertex, metres.
+    pub(crate) fn of_vertex(from: [f64; 2], to: [f64; 2], measure: &Ground) -> f64 {
+        let [dx, dy] = measure.metres_between(from, to);
+        dx.hypot(dy)
+    }
+
+    /// Creates it from the spread of the displacements of all vertices, metres.
+    pub(crate) fn new(spread: &Spread) -> Self {
         Displacement { rms_m: spread.root_mean_square, p99_m: spread.p99, max_m: spread.max }
     }
 }
@@ -127,17 +166,43 @@ pub struct AngleChange {
 impl AngleChange {
     /// Measures the change at the corners of a map.
     pub fn at(corners: &[Corner]) -> Self {
-        let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
-        let right: Vec<&Corner> = corners.iter().filter(|corner| is_right(corner.before_deg)).collect();
-        let kept = right.iter().filter(|corner| corner.change_deg() <= RIGHT_DEG).count();
         let spread = Spread::summarise(corners.iter().map(Corner::change_deg).collect());
+        Self::new(corners.len(), &spread, RightAngles::at(corners))
+    }
+
+    /// Creates it from the spread of the changes of so many angles, degrees.
+    pub(crate) fn new(count: usize, spread: &Spread, right: RightAngles) -> Self {
+        let RightAngles { all, kept } = right;
         AngleChange {
-            count: corners.len(),
+            count,
             mean_change_deg: spread.mean,
             p99_change_deg: spread.p99,
-            right_angles: right.len(),
-            right_angles_kept: if right.is_empty() { 1.0 } else { kept as f64 / right.len() as f64 },
+            right_angles: all,
+            right_angles_kept: if all == 0 { 1.0 } else { kept as f64 / all as f64 },
         }
+    }
+}
+
+/// The right angles of a map.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RightAngles {
+    pub all: usize,
+    /// Those that changed by 1° at most.
+    pub kept: usize,
+}
+
+impl RightAngles {
+    /// Counts those at the corners of a map.
+    pub fn at(corners: &[Corner]) -> Self {
+        let is_right = |angle: f64| [90.0, 270.0].iter().any(|right| (angle - right).abs() <= RIGHT_DEG);
+        let right = corners.iter().filter(|corner| is_right(corner.before_deg));
+        let kept = right.clone().filter(|corner| corner.change_deg() <= RIGHT_DEG);
+        RightAngles { all: right.clone().count(), kept: kept.count() }
+    }
+
+    /// Returns those of two parts of a map.
+    pub fn and(self, other: Self) -> Self {
+        RightAngles { all: self.all + other.all, kept: self.kept + other.kept }
     }
 }
 
@@ -156,7 +221,13 @@ impl Corner {
     /// Returns all corners of a map whose vertices are at `moved` after marking, without those at a
     /// segment of no length.
     pub fn all(map: &Map, moved: &[[f64; 2]]) -> Vec<Self> {
-        let mut ends: Vec<[u32; 2]> = map.segments.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
+        Self::at_some(map, moved, |_| true)
+    }
+
+    /// Returns those of [`Self::all`] at certain vertices.
+    pub(crate) fn at_some(map: &Map, moved: &[[f64; 2]], is_meant: impl Fn(u32) -> bool) -> Vec<Self> {
+        let ends = map.segments.iter().flat_map(|&[a, b]| [[a, b], [b, a]]);
+        let mut ends: Vec<[u32; 2]> = ends.filter(|[at, _]| is_meant(*at)).collect();
         ends.par_sort_unstable();
         let pairs: Vec<&[[u32; 2]]> = ends.chunk_by(|a, b| a[0] == b[0]).filter(|c| c.len() == 2).collect();
         let corner = |pair: &&[[u32; 2]]| {

@@ -23,6 +23,7 @@ pub enum Error {
     MessageLost { errors: usize, bits: usize },
     FingerprintLost { score: f64, least: f64 },
     NoConvergence { vertices: usize },
+    Column { reason: String },
     Message(String),
     Key(KeyFault),
     Record(RecordFault),
@@ -239,6 +240,7 @@ impl Error {
                 "the eigenvalues of a patch of {vertices} vertices did not converge: change {} slightly",
                 name("PATCH_SIZE")
             ),
+            Error::Column { reason } => reason.clone(),
             Error::Message(text) => {
                 format!("message \"{text}\" is not 2 to 256 hexadecimal digits (0-9, a-f)")
             }

@@ -4,6 +4,7 @@ use crate::{
     Result,
     agreement::Evidence,
     boxes::{BoxMap, Boxes},
+    columns::{Columns, InMemory},
     embedding::{Groundwork, Marked, READ_BACK_PATCHES, batch_of},
     estimation::Estimates,
     fingerprint::{Fingerprint, LEAST_SCORE, check_score},
@@ -12,8 +13,9 @@ use crate::{
     part::{PartDigest, Parts},
     patches::Patches,
     series::Series,
-    settled_boxes::{Score, SettledBox, SettledBoxes},
+    settled_boxes::{Score, SettledBox, SettledBoxes, StoredPlaces},
     topology::Settled,
+    vertices::VertexTable,
 };
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -27,6 +29,8 @@ pub struct FingerprintEmbedding<'a> {
     parts: Parts,
     /// A fingerprint is read back from so many patches of a part first.
     read_back: usize,
+    /// Where the numbers of settled boxes wait.
+    columns: &'a dyn Columns,
 }
 
 /// An edition that has parts.
@@ -47,7 +51,7 @@ enum Ground<'a> {
 }
 
 /// The mark of a recipient before the topology of the map is settled.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub struct Wanted {
     /// The displacements of the vertices of the parts that are not in boxes, part after part, CRS units.
     displacements: Vec<[f64; 2]>,
@@ -60,6 +64,33 @@ impl Wanted {
     /// CRS units.
     pub fn displacements(&self) -> &[[f64; 2]] {
         &self.displacements
+    }
+}
+
+/// A map that was marked, and whose places may wait outside memory.
+pub struct Settlement {
+    /// Without places, where these are stored.
+    marked: Marked,
+    stored: Option<StoredPlaces>,
+}
+
+impl Settlement {
+    /// Returns the marked map; `vertices` are those of the unmarked one. What else was needed for the
+    /// marking can be released before.
+    ///
+    /// # Errors
+    /// [`crate::Error::Column`].
+    pub fn marked(self, vertices: &VertexTable) -> Result<Marked> {
+        match self.stored {
+            Some(places) => Ok(Marked { coords: places.load(vertices)?, ..self.marked }),
+            None => Ok(self.marked),
+        }
+    }
+}
+
+impl From<Marked> for Settlement {
+    fn from(marked: Marked) -> Self {
+        Settlement { marked, stored: None }
     }
 }
 
@@ -89,7 +120,12 @@ impl<'a> FingerprintEmbedding<'a> {
             }
         }
         let (parts, read_back) = (Parts::in_turn(named), READ_BACK_PATCHES);
-        Ok(FingerprintEmbedding { series, works, key, coefficients, parts, read_back })
+        Ok(FingerprintEmbedding { series, works, key, coefficients, parts, read_back, columns: &InMemory })
+    }
+
+    /// Lets the numbers of settled boxes wait in such columns instead of memory.
+    pub fn with_columns(self, columns: &'a dyn Columns) -> Self {
+        FingerprintEmbedding { columns, ..self }
     }
 
     /// Prepares for many recipients: it solves once for the bases of the patches from which each
@@ -173,13 +209,13 @@ impl<'a> FingerprintEmbedding<'a> {
     ///
     /// # Errors
     /// Fails on a patch that cannot be solved, and returns [`crate::Error::TooFewInParts`] where no box
-    /// carries signs.
+    /// carries signs, and [`crate::Error::Column`].
     pub fn wanted(
         &self,
         fingerprints: &[Fingerprint],
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<Wanted>> {
-        let mut all = vec![Wanted::default(); fingerprints.len()];
+        let mut all: Vec<Wanted> = fingerprints.iter().map(|_| Wanted::default()).collect();
         for work in &self.works {
             match &work.ground {
                 Ground::Part(groundwork) => {
@@ -204,7 +240,10 @@ impl<'a> FingerprintEmbedding<'a> {
         fingerprints: &[Fingerprint],
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<SettledBoxes>> {
-        let mut all = vec![SettledBoxes::new(boxes); fingerprints.len()];
+        let mut all = fingerprints
+            .iter()
+            .map(|_| SettledBoxes::new(boxes, self.columns))
+            .collect::<Result<Vec<SettledBoxes>>>()?;
         let newest = (work.edition + 1 < self.series.len()).then(|| self.series.map().vertices);
         for number in 0..boxes.len() {
             let of_box: Vec<Fingerprint> =
@@ -213,7 +252,7 @@ impl<'a> FingerprintEmbedding<'a> {
                 let embedding = embedding.for_many()?;
                 let wanted = embedding.wanted(&of_box, progress)?;
                 let settle = |((all, fingerprint), wanted): ((&mut SettledBoxes, &Fingerprint), Wanted)| {
-                    let settled = embedding.settle_all(wanted).pop().expect("a box is an edition");
+                    let settled = embedding.settle_all(wanted)?.pop().expect("a box is an edition");
                     // Evidence of an earlier edition is that of the vertices that are still there.
                     let vertices = embedding.series.map().vertices;
                     let place = |at: [f64; 2]| {
@@ -223,8 +262,7 @@ impl<'a> FingerprintEmbedding<'a> {
                     let deviation_m = |_| settled.deviation_m;
                     let score =
                         embedding.score_on(fingerprint, &place, &deviation_m, Some(embedding.read_back))?;
-                    all.add(cut, embedding.settled_box(settled, score));
-                    Ok(())
+                    all.add(cut, &embedding.series.map(), embedding.settled_box(settled, score))
                 };
                 all.par_iter_mut().zip(&of_box).zip(wanted).try_for_each(settle)
             })?;
@@ -260,14 +298,46 @@ impl<'a> FingerprintEmbedding<'a> {
     /// back from the result, from as many patches as it takes.
     ///
     /// # Errors
-    /// [`crate::Error::FingerprintLost`].
+    /// [`crate::Error::FingerprintLost`], [`crate::Error::Column`].
     pub fn settle(&self, fingerprint: &Fingerprint, wanted: Wanted) -> Result<Marked> {
+        self.settle_stored(fingerprint, wanted)?.marked(self.series.map().vertices)
+    }
+
+    /// Does the same as [`Self::settle`], and leaves the places of a map in boxes where they are.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Self::settle`].
+    pub fn settle_stored(&self, fingerprint: &Fingerprint, mut wanted: Wanted) -> Result<Settlement> {
+        if self.series.len() > 1 || self.series.boxes(0).is_none() {
+            return Ok(self.settle_editions(fingerprint, wanted)?.into());
+        }
+        let settled = wanted.in_boxes.pop().expect("the mark is of this embedding");
+        let vertices = self.series.map().vertices;
+        if settled.score.deviations() < LEAST_SCORE {
+            let Settled { coords, deviation_m, .. } = settled.settled(vertices)?;
+            let place = |at: [f64; 2]| vertices.index_of(at).map(|v| coords[v]);
+            check_score(self.score_on_boxes(fingerprint, &place, &|_| deviation_m)?.deviations())?;
+        }
+        let (displacement, angles) = settled.changes()?;
+        let marked = Marked {
+            coords: Vec::new(),
+            patches: settled.patches.iter().sum(),
+            displacement,
+            angles,
+            junctions: settled.hanging,
+            attenuated: settled.attenuated,
+        };
+        Ok(Settlement { marked, stored: Some(settled.into_places()) })
+    }
+
+    /// Marks the newest map of several editions, or a map in one part.
+    fn settle_editions(&self, fingerprint: &Fingerprint, wanted: Wanted) -> Result<Marked> {
         let patches = self.divided(&wanted).parts.iter().map(|part| part.patches).sum();
         let signless = self.signless(&wanted);
         let in_boxes: Score =
             wanted.in_boxes.iter().fold(Score::default(), |all, settled| all.and(settled.score));
         let hanging_in_boxes = self.newest_in_boxes(&wanted).map(|newest| newest.hanging);
-        let mut settled = self.settle_all(wanted);
+        let mut settled = self.settle_all(wanted)?;
         let newest = settled.pop().expect("a series has an edition");
         let mut deviations: Vec<f64> = settled.iter().map(|settled| settled.deviation_m).collect();
         deviations.push(newest.deviation_m);
@@ -320,15 +390,15 @@ impl<'a> FingerprintEmbedding<'a> {
     }
 
     /// Moves all editions, one after the other.
-    fn settle_all(&self, wanted: Wanted) -> Vec<Settled> {
+    fn settle_all(&self, wanted: Wanted) -> Result<Vec<Settled>> {
         let mut settled: Vec<Settled> = Vec::new();
         let mut works = self.works.iter().peekable();
         let (mut rest, mut in_boxes) = (&wanted.displacements[..], wanted.in_boxes.into_iter());
         for edition in 0..self.series.len() {
             let groundwork = match works.next_if(|work| work.edition == edition).map(|work| &work.ground) {
-                Some(Ground::Boxes(_)) => {
-                    let boxes = in_boxes.next().expect("the mark is of this embedding");
-                    settled.push(boxes.settled());
+                Some(Ground::Boxes(boxes)) => {
+                    let of_boxes = in_boxes.next().expect("the mark is of this embedding");
+                    settled.push(of_boxes.settled(boxes.map().vertices)?);
                     continue;
                 }
                 Some(Ground::Part(groundwork)) => Some(&**groundwork),
@@ -338,7 +408,7 @@ impl<'a> FingerprintEmbedding<'a> {
             settled.push(self.series.settle(edition, groundwork, own, &settled));
             rest = later;
         }
-        settled
+        Ok(settled)
     }
 
     /// Returns the score on the `first` patches of every part that is not a box, or on all, given the

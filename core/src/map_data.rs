@@ -75,8 +75,8 @@ impl MapData {
         kinds: impl IntoIterator<Item = ChainKind>,
     ) -> Result<(Self, Vec<u32>)> {
         let (vertices, indices) = VertexTable::indexed(coords)?;
-        let segments = segments(&indices, starts);
         let polygon_roots = polygon_roots(&indices, starts, kinds, vertices.len());
+        let segments = segments(&indices, starts);
         Ok((MapData { segments, polygon_roots, ..Self::of_points(vertices) }, indices))
     }
 
@@ -150,6 +150,13 @@ impl MapData {
         let (labels, polylines) = (self.labels.clone(), self.polylines.clone());
         let segments = distinct(segments.into_iter());
         Ok(MapData { vertices, segments, polygon_roots: joined.roots(), areas, labels, polylines })
+    }
+
+    /// Releases segments and polygon groups, which only the marking of a map and the reading of its mark
+    /// need.
+    pub fn release_mesh(&mut self) {
+        self.segments = Vec::new();
+        self.polygon_roots = Vec::new();
     }
 
     /// Returns the map as input of the algorithm; `ground` has the metres of the mark, `measure`

@@ -32,13 +32,15 @@ impl VertexTable {
             let [x, y] = coords[index];
             return Err(Error::NotFinite { index, x, y });
         }
-        let mut sorted: Vec<([f64; 2], u32)> = coords.into_iter().map(canonical).zip(0..).collect();
+        let mut sorted: Vec<([f64; 2], u32)> = Vec::with_capacity(coords.len());
+        let places = (0..coords.len() as u32).rev();
+        sorted.extend(FromEnd(coords).map(canonical).zip(places));
         // Hosts may fork between two jobs, and a map is read outside the job's own threads: a parallel
         // sort would start rayon's, which never end and which a child process lacks.
-        sorted.sort_unstable_by(|a, b| order(&a.0, &b.0));
+        sorted.sort_unstable_by(|a, b| order(&b.0, &a.0));
         let mut indices = vec![0; sorted.len()];
         let mut coords: Vec<[f64; 2]> = Vec::new();
-        for (point, place) in sorted {
+        for (point, place) in FromEnd(sorted) {
             if coords.last() != Some(&point) {
                 coords.push(point);
             }
@@ -110,6 +112,21 @@ impl VertexTable {
             hash.update(y.to_le_bytes());
         }
         hash.finalize().into()
+    }
+}
+
+/// The items of a large vector from the last to the first. Their memory is released on the way, so
+/// that what is made of them takes its place.
+struct FromEnd<T>(Vec<T>);
+
+impl<T> Iterator for FromEnd<T> {
+    type Item = T;
+    fn next(&mut self) -> Option<T> {
+        const BLOCK: usize = 1 << 20;
+        if self.0.len().is_multiple_of(BLOCK) {
+            self.0.shrink_to_fit();
+        }
+        self.0.pop()
     }
 }
 

@@ -5,7 +5,9 @@ mod towns;
 use meshmark_core::{
     Error,
     agreement::Evidence,
+    columns::{Column, Columns, InMemory},
     deformation::Prediction,
+    distortion::{AngleChange, Corner, Displacement},
     embedding::Marked,
     estimation::Estimates,
     fingerprint::recipient_signs,
@@ -129,6 +131,56 @@ fn the_parts_of_the_reference_are_those_of_the_mark_and_their_evidence_adds_up()
     let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS).unwrap();
     let read = |name: &str| embedding.score(&embedding.fingerprint(name), &marked.coords, 0.01).unwrap();
     assert!(read("ACME") > 20.0 && read("Other").abs() < 5.0);
+}
+
+#[test]
+fn the_figures_of_all_boxes_are_those_of_the_whole_map() {
+    let data = data(&town_with_long_lines(11));
+    let map = on(&data);
+    for part_size in [400, 1000] {
+        let (marked, divided) = mark(&data, part_size).unwrap();
+        assert!(divided.parts.len() > 1);
+        assert_eq!(marked.displacement, Displacement::between(&data.vertices, &marked.coords, map.measure));
+        assert_eq!(marked.angles, AngleChange::at(&Corner::all(&map, &marked.coords)));
+        assert!(marked.angles.right_angles > 100 && marked.displacement.max_m > 0.1, "{marked:?}");
+    }
+}
+
+/// Columns that have room for so many numbers each.
+struct Room(usize);
+
+struct Full(Box<dyn Column>, usize);
+
+impl Columns for Room {
+    fn column(&self) -> Result<Box<dyn Column>, Error> {
+        Ok(Box::new(Full(InMemory.column()?, self.0)))
+    }
+}
+
+impl Column for Full {
+    fn append(&mut self, numbers: &[f64]) -> Result<(), Error> {
+        self.1 = self.1.checked_sub(numbers.len()).ok_or(Error::Column { reason: "it is full".into() })?;
+        self.0.append(numbers)
+    }
+    fn read(&self, first: usize, numbers: &mut [f64]) -> Result<(), Error> {
+        self.0.read(first, numbers)
+    }
+}
+
+#[test]
+fn a_mark_does_not_depend_on_where_numbers_wait_and_no_map_is_marked_where_they_have_no_room() {
+    let (data, parameters, key) = (data(&town(4)), parameters(), key());
+    let series = in_parts(&data, 600, &parameters);
+    let mark_with = |columns: &Room| {
+        let embedding = FingerprintEmbedding::new(&series, &key, COEFFICIENTS)?.with_columns(columns);
+        let fingerprint = embedding.fingerprint("ACME");
+        let wanted = embedding.wanted(std::slice::from_ref(&fingerprint), &|_| ())?.pop().unwrap();
+        embedding.settle(&fingerprint, wanted)
+    };
+    let places = 2 * data.vertices.len();
+    assert!(mark_with(&Room(places)).unwrap() == mark(&data, 600).unwrap().0);
+    let full = mark_with(&Room(places - 1)).unwrap_err();
+    assert_eq!(full.to_string(), "it is full");
 }
 
 #[test]

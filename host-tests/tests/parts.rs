@@ -156,3 +156,24 @@ fn a_part_size_that_makes_no_parts_is_refused_and_so_is_a_record_of_other_parts(
         assert!(!host.path("no.gpkg").exists());
     }
 }
+
+#[test]
+fn a_map_in_parts_leaves_nothing_among_temporary_files_and_is_not_marked_without_a_folder_for_them() {
+    let host = Host::new();
+    host.copy("helsinki.gpkg", "map.gpkg");
+    fs::create_dir(host.path("scratch")).unwrap();
+    let mark = |folder: &str| {
+        let part_size = format!("PART_SIZE={PART_SIZE}");
+        let arguments = ["-f", "GPKG", "copy.gpkg", "MESHMARK:map.gpkg", "-oo", "KEY=key.json", "-oo"];
+        let arguments = [&arguments[..], &["RECIPIENT=ACME GmbH", "-oo", &part_size]].concat();
+        host.run_with("ogr2ogr", &arguments, &[("TMPDIR", host.path(folder).to_str().unwrap())])
+    };
+    let refused = mark("none");
+    let words = ["a temporary file in", "No such file or directory", "TMPDIR"];
+    let has_all = words.iter().all(|words| refused.stderr.contains(words));
+    assert!(refused.code != Some(0) && has_all, "{}", refused.stderr);
+    assert!(!host.path("copy.gpkg").exists());
+    mark("scratch").succeeds();
+    assert_eq!(fs::read_dir(host.path("scratch")).unwrap().count(), 0);
+    assert_eq!(moved(&host, "map.gpkg", "copy.gpkg"), moved(&marked(), "map.gpkg", "copy.gpkg"));
+}

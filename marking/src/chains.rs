@@ -111,6 +111,9 @@ impl Chains {
 
     /// Appends the chains of another walk, which is then empty.
     pub fn append(&mut self, other: &mut Chains) {
+        if self.firsts.is_empty() {
+            return std::mem::swap(self, other);
+        }
         let (of_starts, offset) = (self.starts.len() as u32, self.coords.len() as u32);
         let geometries = self.firsts.len() as u32;
         let others = std::mem::take(&mut other.others);

@@ -237,8 +237,14 @@ pub fn mark(
     collector.clear();
     let last_failure = || collector.first_failure();
     let mut read_base = |path: &Path, selection: &Selection| read_base(path, selection, &collector);
-    let surveyed =
-        Source { name, dataset: source, files, last_failure: &last_failure, read_base: &mut read_base };
+    let surveyed = Source {
+        name,
+        dataset: source,
+        files,
+        is_staged: native_column.is_some(),
+        last_failure: &last_failure,
+        read_base: &mut read_base,
+    };
     let mut marking = Marking::new(request, surveyed, threads())?;
     drop(geometry_only);
     let foreign = ForeignMembers { of: &foreign_members, column: native_column };

@@ -11,9 +11,9 @@ use gdal::Dataset;
 use meshmark_core::{
     carrier::Carrier,
     demodulation,
-    embedding::{Embedding, Marked},
+    embedding::Embedding,
     fingerprint,
-    fingerprint_embedding::FingerprintEmbedding,
+    fingerprint_embedding::{FingerprintEmbedding, Settlement},
     fingerprint_record::BaseEntry,
     key::{SecretKey, read_text},
     map::Map,
@@ -22,7 +22,7 @@ use meshmark_core::{
     recorded::Recorded,
 };
 use meshmark_dataset::{
-    GeosOfGdal, LabelFields, MOST_VERTICES, Selection, Survey,
+    GeosOfGdal, LabelFields, MOST_VERTICES, ScratchFiles, Selection, Survey,
     decimals::Digits,
     read_bases, same_file, survey,
     traces::{self, ForeignMembers},
@@ -100,24 +100,25 @@ impl MarkingRequest {
     }
 
     /// Marks a map on its bases; returns the lineage of a fingerprint, too.
-    fn embed(&self, map: Map, bases: &Bases) -> meshmark_core::Result<(Marked, Lineage)> {
+    fn embed(&self, map: Map, bases: &Bases) -> meshmark_core::Result<(Settlement, Lineage)> {
         let MarkingRequest { options, subject, key, progress, .. } = self;
         let Options { parameters, coefficients, .. } = options;
         if let (Some(coefficients), Subject::Recipient(recipient)) = (coefficients, subject) {
             let series = bases.series(map, parameters)?;
-            let embedding = FingerprintEmbedding::new(&series, key, *coefficients)?;
+            let embedding =
+                FingerprintEmbedding::new(&series, key, *coefficients)?.with_columns(&ScratchFiles);
             let fingerprint = embedding.fingerprint(recipient);
             progress.begin(embedding.patches());
             let wanted = embedding.wanted(slice::from_ref(&fingerprint), &|_| progress.step())?;
             let wanted = wanted.into_iter().next().expect("one for each fingerprint");
             let divided = embedding.divided(&wanted);
-            return Ok((embedding.settle(&fingerprint, wanted)?, bases.lineage(divided)));
+            return Ok((embedding.settle_stored(&fingerprint, wanted)?, bases.lineage(divided)));
         }
         let message = subject.carried(key);
         let embedding = Embedding::new(&map, key, message.len(), parameters)?;
         progress.begin(embedding.patches());
         let wanted = embedding.wanted(slice::from_ref(&message), &|_| progress.step())?;
-        Ok((embedding.settle(&message, &wanted[0])?, Lineage::default()))
+        Ok((embedding.settle(&message, &wanted[0])?.into(), Lineage::default()))
     }
 
     /// Returns the path of the record.
@@ -171,6 +172,8 @@ pub struct Source<'a> {
     pub dataset: &'a Dataset,
     /// Its files in their state before it was read.
     pub files: SourceFiles,
+    /// Whether it is staged, so that the mark is read back from the file that is made of it.
+    pub is_staged: bool,
     /// The function for [`Selection::last_failure`].
     pub last_failure: &'a dyn Fn() -> Option<String>,
     /// Reads the reference of an earlier edition.
@@ -213,8 +216,13 @@ impl Marking {
         };
         let bases = read_bases(options, &request.key, &map, &mut read)?;
         let pool = pool(threads)?;
-        let (marked, lineage) = pool.install(|| request.embed(on_ground, &bases))?;
+        let (settlement, lineage) = pool.install(|| request.embed(on_ground, &bases))?;
+        if !source.is_staged {
+            map.data.release_mesh();
+        }
+        let marked = settlement.marked(&map.data.vertices)?;
         let parameters = &options.parameters;
+        let on_ground = map.map(parameters)?;
         let distortion = map.geometries.as_ref().map(|geometries| {
             pool.install(|| {
                 Unmarked::new(geometries, &on_ground, &GeosOfGdal).distortion(&marked, parameters)

@@ -322,9 +322,8 @@ impl Error {
         use Error::*;
         match self {
             Map { source, .. } => of_map_that_is_read(source),
-            Dataset(MapError::File { .. } | MapError::NotKept { .. } | MapError::Gdal(_)) => {
-                ExitCode::Unwritable
-            }
+            Dataset(MapError::File { .. } | MapError::NotKept { .. } | MapError::Gdal(_))
+            | Core(meshmark_core::Error::Column { .. }) => ExitCode::Unwritable,
             Dataset(error) if error.is_of_other_base() => ExitCode::DoesNotBelong,
             Verification(error) if error.is_of_others() => ExitCode::DoesNotBelong,
             NotDeposited { .. }

@@ -30,8 +30,8 @@ pub struct State {
 impl State {
     /// Measures all geometries.
     pub fn measure(outlines: Outlines, geos: &dyn Geos) -> Self {
-        let sights = Sight::measure_all(outlines, geos);
-        let common = overlaps::common_areas(outlines, &sights, geos);
+        let (sights, bounds) = Sight::measure_all(outlines, geos);
+        let common = overlaps::common_areas(outlines, (&sights, bounds), geos);
         State { sights, common }
     }
 }

@@ -3,13 +3,13 @@
 use super::{
     geos::{Geos, Neighbours},
     linework::Linework,
-    sights::{Outlines, Sight},
+    sights::{Bounds, Outlines, Sight},
 };
 use crate::{Outline, wkb::Step};
 use meshmark_core::distortion::Overlaps;
 use rayon::prelude::*;
 use rstar::{
-    RTree,
+    RTree, RTreeObject,
     primitives::{GeomWithData, Rectangle},
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,14 +28,19 @@ type NumberedBounds = GeomWithData<Rectangle<[f64; 2]>, u32>;
 pub(super) type CommonAreas = BTreeMap<[u32; 2], f64>;
 
 /// Computes the common areas of pairs of valid polygons that have one, CRS units squared.
-pub(super) fn common_areas(outlines: Outlines, sights: &[Sight], geos: &dyn Geos) -> CommonAreas {
-    let polygons = (0u32..).zip(sights).filter(|(_, sight)| sight.is_valid && sight.area > 0.0);
-    let boxes: Vec<NumberedBounds> =
-        polygons.map(|(number, sight)| NumberedBounds::new(sight.bounds.into(), number)).collect();
-    let tree = RTree::bulk_load(boxes.clone());
+pub(super) fn common_areas(
+    outlines: Outlines,
+    (sights, bounds): (&[Sight], Vec<Bounds>),
+    geos: &dyn Geos,
+) -> CommonAreas {
+    let is_polygon = |number: u32| sights[number as usize].is_valid && sights[number as usize].area > 0.0;
+    let polygons = (0..).zip(bounds).filter(|(number, _)| is_polygon(*number));
+    let polygons = polygons.map(|(number, bounds)| NumberedBounds::new(bounds.into(), number));
+    let tree = RTree::bulk_load(polygons.collect());
+    let boxes: Vec<&NumberedBounds> = tree.iter().collect();
     let search = Search { outlines, large: large(outlines, &boxes) };
-    let near = |polygon: &NumberedBounds| {
-        let near = tree.locate_in_envelope_intersecting(&sights[polygon.data as usize].bounds);
+    let near = |polygon: &&NumberedBounds| {
+        let near = tree.locate_in_envelope_intersecting(&polygon.envelope());
         let mut later: Vec<u32> =
             near.map(|other| other.data).filter(|other| *other > polygon.data).collect();
         later.sort_unstable();
@@ -59,8 +64,8 @@ pub(super) fn common_areas(outlines: Outlines, sights: &[Sight], geos: &dyn Geos
 
 /// Returns the segments of all polygons with many vertices; `None` for those that do not consist of
 /// rings.
-fn large(outlines: Outlines, boxes: &[NumberedBounds]) -> BTreeMap<u32, Option<Linework>> {
-    let sorted = |polygon: &NumberedBounds| {
+fn large(outlines: Outlines, boxes: &[&NumberedBounds]) -> BTreeMap<u32, Option<Linework>> {
+    let sorted = |polygon: &&NumberedBounds| {
         let outline = (outlines.get)(polygon.data as usize);
         let vertices: usize = outline.chains.iter().map(Vec::len).sum();
         (vertices > MANY_VERTICES).then(|| (polygon.data, rings(&outline)))

@@ -23,14 +23,16 @@ pub(super) struct Sight {
     pub(super) is_valid: bool,
     /// Its area, CRS units squared; 0 without one.
     pub(super) area: f64,
-    /// Its bounding box, inside out for an empty one.
-    pub(super) bounds: AABB<[f64; 2]>,
 }
 
+/// The bounding box of a geometry, inside out for an empty one.
+pub(super) type Bounds = AABB<[f64; 2]>;
+
 impl Sight {
-    /// Measures all geometries.
-    pub(super) fn measure_all(outlines: Outlines, geos: &dyn Geos) -> Vec<Self> {
-        let mut sights = Vec::with_capacity(outlines.count);
+    /// Measures all geometries; returns their bounding boxes, too.
+    pub(super) fn measure_all(outlines: Outlines, geos: &dyn Geos) -> (Vec<Self>, Vec<Bounds>) {
+        let (mut sights, mut bounds) =
+            (Vec::with_capacity(outlines.count), Vec::with_capacity(outlines.count));
         for first in (0..outlines.count).step_by(BATCH) {
             let numbers = first..outlines.count.min(first + BATCH);
             let batch: Vec<Cow<Outline>> =
@@ -38,19 +40,23 @@ impl Sight {
             let are_valid = geos.are_valid(&batch);
             let measure =
                 |(outline, is_valid): (&Cow<Outline>, bool)| Sight::measure(outline, is_valid, geos);
-            sights.par_extend(batch.par_iter().zip(are_valid).map(measure));
+            let measured: Vec<(Sight, Bounds)> = batch.par_iter().zip(are_valid).map(measure).collect();
+            for (sight, of_sight) in measured {
+                sights.push(sight);
+                bounds.push(of_sight);
+            }
         }
-        sights
+        (sights, bounds)
     }
 
-    fn measure(outline: &Outline, is_valid: bool, geos: &dyn Geos) -> Self {
+    fn measure(outline: &Outline, is_valid: bool, geos: &dyn Geos) -> (Self, Bounds) {
         let mut bounds = AABB::new_empty();
         outline.chains.iter().flatten().for_each(|point| bounds.merge(&AABB::from_point(*point)));
         if outline.is_plain() || outline.chains.is_empty() {
-            return Sight { is_valid, area: outline.area(), bounds };
+            return (Sight { is_valid, area: outline.area() }, bounds);
         }
         let (area, whole) = geos.extents(outline); // with the bellies of arcs
         bounds.merge(&whole);
-        Sight { is_valid, area, bounds }
+        (Sight { is_valid, area }, bounds)
     }
 }

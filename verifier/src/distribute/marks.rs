@@ -13,6 +13,7 @@ use meshmark_core::{
     options::Options,
     series::Series,
 };
+use meshmark_dataset::ScratchFiles;
 
 /// The part of a marking that all copies share.
 pub enum Marks<'a> {
@@ -41,7 +42,8 @@ impl<'a> Marks<'a> {
         let parameters = &options.parameters;
         Ok(match options.coefficients {
             Some(coefficients) => {
-                Marks::Fingerprints(FingerprintEmbedding::new(series, key, coefficients)?.for_many()?)
+                let embedding = FingerprintEmbedding::new(series, key, coefficients)?;
+                Marks::Fingerprints(embedding.with_columns(&ScratchFiles).for_many()?)
             }
             None => {
                 let embedding = Embedding::new(map, key, RECIPIENT_BITS, parameters)?.for_many()?;
