@@ -308,9 +308,9 @@ impl<'a> FingerprintEmbedding<'a> {
     /// # Errors
     /// Returns the errors of [`Self::settle`].
     pub fn settle_stored(&self, fingerprint: &Fingerprint, mut wanted: Wanted) -> Result<Settlement> {
-        if self.series.len() > 1 || self.series.boxes(0).is_none() {
+        let Some(boxes) = self.series.boxes(0).filter(|_| self.series.len() == 1) else {
             return Ok(self.settle_editions(fingerprint, wanted)?.into());
-        }
+        };
         let settled = wanted.in_boxes.pop().expect("the mark is of this embedding");
         let vertices = self.series.map().vertices;
         if settled.score.deviations() < LEAST_SCORE {
@@ -326,6 +326,7 @@ impl<'a> FingerprintEmbedding<'a> {
             angles,
             junctions: settled.hanging,
             attenuated: settled.attenuated,
+            signless: signless_in(boxes, &settled.patches),
         };
         Ok(Settlement { marked, stored: Some(settled.into_places()) })
     }
@@ -363,10 +364,7 @@ impl<'a> FingerprintEmbedding<'a> {
     fn signless(&self, wanted: &Wanted) -> usize {
         let newest = self.series.len() - 1;
         match (self.series.boxes(newest), self.newest_in_boxes(wanted)) {
-            (Some(boxes), Some(settled)) => {
-                let is_empty = |number: &usize| settled.patches[*number] == 0;
-                (0..boxes.len()).filter(is_empty).map(|number| boxes.vertices(number)).sum()
-            }
+            (Some(boxes), Some(settled)) => signless_in(boxes, &settled.patches),
             _ if self.works.iter().any(|work| work.edition == newest) => 0,
             _ => self.series.census().map_or(0, |census| census.free),
         }
@@ -480,4 +478,10 @@ pub fn embed(
     let wanted = wanted.pop().expect("one for each fingerprint");
     let divided = embedding.divided(&wanted);
     Ok((embedding.settle(&fingerprint, wanted)?, divided))
+}
+
+/// Returns how many vertices are in boxes without patches.
+fn signless_in(boxes: &Boxes, patches: &[usize]) -> usize {
+    let is_empty = |number: &usize| patches[*number] == 0;
+    (0..boxes.len()).filter(is_empty).map(|number| boxes.vertices(number)).sum()
 }
