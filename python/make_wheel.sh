@@ -23,8 +23,8 @@ root=$PWD
 cd "$out/clean"
 bin/python -m unittest discover -s "$root/python/tests"
 bin/python -c 'import doctest, sys, meshmark
-from meshmark import _comparison, _distribution, _verification
-modules = (meshmark, _comparison, _distribution, _verification)
+from meshmark import _comparison, _distribution, _evidence, _layers, _verification
+modules = (meshmark, _comparison, _distribution, _evidence, _layers, _verification)
 sys.exit(any(doctest.testmod(module).failed for module in modules))'
 cd "$root"
 ls -l "$out"/wheels

@@ -17,6 +17,8 @@ The command ``meshmark verify`` recognises the copy as well.
 
 from ._comparison import compare
 from ._distribution import distribute
+from ._evidence import evidence_map
+from ._layers import Layer
 from ._marking import mark
 from ._meshmark import (
     Comparison,
@@ -29,6 +31,7 @@ from ._meshmark import (
     RecordError,
     Report,
     __version__,
+    creation_option_list,
 )
 from ._verification import verify
 
@@ -36,6 +39,7 @@ __all__ = [
     "Comparison",
     "Key",
     "KeyFileError",
+    "Layer",
     "MapError",
     "MeshmarkError",
     "OptionError",
@@ -43,7 +47,9 @@ __all__ = [
     "RecordError",
     "Report",
     "compare",
+    "creation_option_list",
     "distribute",
+    "evidence_map",
     "mark",
     "verify",
 ]

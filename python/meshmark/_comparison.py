@@ -24,7 +24,7 @@ def compare(
 
     Parameters
     ----------
-    reference : geopandas.GeoDataFrame, array of shapely's geometries, table, or dict of str to these
+    reference : geopandas.GeoDataFrame, array of shapely's geometries, Layer, table, or dict of str to these
         The map as it was before marking.
     marked : the same
         The marked map.

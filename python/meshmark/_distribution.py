@@ -29,7 +29,7 @@ def distribute(
 
     Parameters
     ----------
-    layers : geopandas.GeoDataFrame, array of shapely's geometries, table, or dict of str to these
+    layers : geopandas.GeoDataFrame, array of shapely's geometries, Layer, table, or dict of str to these
         The map, which must not be changed before the last copy is there.
     key : Key
         The secret key.

@@ -3,8 +3,42 @@
 import numpy
 import shapely
 
-from ._attributes import texts_of, values_of_series
+from ._attributes import texts_of, values_of, values_of_series
 from ._crs import Crs
+
+
+class Layer:
+    """A layer of well-known binary, for programs that have features but no GeoDataFrame, such as QGIS.
+
+    Parameters
+    ----------
+    geometries : sequence of bytes or None
+        The geometries, with heights and measures; None for a missing one.
+    crs : optional
+        The CRS, whatever ``pyproj.CRS`` takes.
+    attributes : dict of str to sequence, optional
+        The values of the features by column. Texts and integers help a verification to find places.
+    ids : sequence, optional
+        The ids by which messages name the features; their numbers by default.
+
+    Examples
+    --------
+    >>> import meshmark, shapely
+    >>> houses = [shapely.box(20 * x, 20 * y, 20 * x + 9 + (x * y) % 5, 20 * y + 8) for x in range(20) for y in range(20)]
+    >>> town = meshmark.Layer(shapely.to_wkb(houses).tolist(), "EPSG:3067")
+    >>> copy, record = meshmark.mark(town, meshmark.Key.generate(), recipient="ACME GmbH")
+    >>> len(copy.geometries)
+    400
+    """
+
+    def __init__(self, geometries, crs=None, attributes=None, ids=None):
+        self.geometries = list(geometries)
+        self.crs = crs
+        self.attributes = dict(attributes or {})
+        self.ids = ids
+        for name, values in [*self.attributes.items(), *([("ids", ids)] if ids is not None else [])]:
+            if len(values) != len(self.geometries):
+                raise ValueError(f"{name} has {len(values)} values, and there are {len(self.geometries)} geometries")
 
 
 class Column:
@@ -71,6 +105,22 @@ class Series:
         series = self.series
         array = shapely.from_wkb(geometries[0])
         return type(series)(array, index=series.index, crs=series.crs, name=series.name)
+
+
+class Binary:
+    """A `Layer`."""
+
+    def __init__(self, name, layer):
+        self.layer = layer
+        self.columns = [Column(name, layer.geometries, layer.crs, layer.ids)]
+
+    def attributes(self):
+        """Return names and values of the columns."""
+        return {name: values_of(values) for name, values in self.layer.attributes.items()}
+
+    def moved(self, geometries):
+        """Return a copy with these geometries."""
+        return Layer(geometries[0], self.layer.crs, self.layer.attributes, self.layer.ids)
 
 
 class Array:
@@ -143,8 +193,10 @@ def source(name, layer, geometry, is_shared=False):
 
     Where several maps share it, it does not concern those that have geometry columns of their own.
     """
-    if geometry is not None and not is_shared and (hasattr(layer, "geom_type") or isinstance(layer, numpy.ndarray)):
+    if geometry is not None and not is_shared and (hasattr(layer, "geom_type") or isinstance(layer, (numpy.ndarray, Layer))):
         raise TypeError(f"geometry={geometry!r} is for tables without metadata, and layer {name!r} is none")
+    if isinstance(layer, Layer):
+        return Binary(name, layer)
     if hasattr(layer, "geom_type") and hasattr(layer, "index"):
         return (Frame if hasattr(layer, "columns") else Series)(name, layer)
     if any(str(dtype) == "geometry" for dtype in getattr(layer, "dtypes", ())):

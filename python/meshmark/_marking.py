@@ -25,7 +25,7 @@ def mark(
 
     Parameters
     ----------
-    layers : geopandas.GeoDataFrame, array of shapely's geometries, table, or dict of str to these
+    layers : geopandas.GeoDataFrame, array of shapely's geometries, Layer, table, or dict of str to these
         The map; several layers share one mesh, and one CRS. A table is any object with the Arrow
         interface, whose geometry columns are well-known binary.
     key : Key

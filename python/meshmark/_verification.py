@@ -25,6 +25,7 @@ def verify(
     demodulator: str = "joint",
     radius: Optional[float] = None,
     significance: float = 1e-6,
+    evidence_map: bool = False,
     exact_displacements: bool = False,
     show_recipients: bool = False,
     threads: Optional[int] = None,
@@ -35,7 +36,7 @@ def verify(
 
     Parameters
     ----------
-    suspect : geopandas.GeoDataFrame, array of shapely's geometries, table, or dict of str to these
+    suspect : geopandas.GeoDataFrame, array of shapely's geometries, Layer, table, or dict of str to these
         The map in question, in any CRS, or without one.
     reference : the same, or a list of these
         The map as it was before marking; several, such as editions, where records choose among them.
@@ -63,6 +64,8 @@ def verify(
         Radius within which vertices match, metres on the ground; by default it follows from the suspect.
     significance : float
         The verdict is a match when the p-value is below this.
+    evidence_map : bool
+        Whether the function `evidence_map` gives the evidence of the report as layers.
     exact_displacements : bool
         Whether the report has exact displacements of vertices; it is then to be kept as secret as the records.
     show_recipients : bool
@@ -110,7 +113,8 @@ def verify(
         check_kind(name, word, (str,), "a text")
     check_kind("significance", significance, (numbers.Real,), "a number")
     check_kind("radius", radius, (numbers.Real, type(None)), "a number")
-    check_switches({"exact_displacements": exact_displacements, "show_recipients": show_recipients})
+    switches = {"evidence_map": evidence_map, "exact_displacements": exact_displacements}
+    check_switches({**switches, "show_recipients": show_recipients})
     pairs = option_pairs({"recipient": recipient, "message": message, "srs": srs}, options)
     if records is not None and (record is not None or pairs):
         given = "record" if record is not None else pairs[0][0].lower()
@@ -128,6 +132,7 @@ def verify(
         "demodulator": demodulator,
         "radius": radius,
         "significance": significance,
+        "evidence_map": evidence_map,
         "exact_displacements": exact_displacements,
         "show_recipients": show_recipients,
         "threads": threads,

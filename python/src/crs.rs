@@ -33,6 +33,11 @@ impl PyCrs {
         call_waiting(move |py| f(own.0.object.bind(py)))
     }
 
+    /// Returns the object of Python.
+    pub fn object<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        self.0.object.bind(py).clone()
+    }
+
     fn transformed(&self, x: &[f64], y: &[f64], target: Option<&PyCrs>) -> PyResult<[Vec<f64>; 2]> {
         let (x, y, target) = (x.to_vec(), y.to_vec(), target.cloned());
         self.ask(move |object| {

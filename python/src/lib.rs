@@ -17,7 +17,15 @@ mod report;
 mod verification;
 mod waiting;
 
+use meshmark_core::options::creation_option_list_xml;
 use pyo3::prelude::*;
+
+/// Return the options of the driver with their types, bounds, defaults and help, as the XML that GDAL has
+/// for them (DMD_CREATIONOPTIONLIST): dialogs are made from it, with or without the driver.
+#[pyfunction]
+fn creation_option_list() -> String {
+    creation_option_list_xml()
+}
 
 #[pymodule]
 fn _meshmark(module: &Bound<PyModule>) -> PyResult<()> {
@@ -27,6 +35,7 @@ fn _meshmark(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<record::Record>()?;
     module.add_class::<report::Report>()?;
     module.add_class::<comparison::Comparison>()?;
+    module.add_function(wrap_pyfunction!(creation_option_list, module)?)?;
     module.add_function(wrap_pyfunction!(marking::mark, module)?)?;
     module.add_function(wrap_pyfunction!(marking::check_recipients, module)?)?;
     module.add_function(wrap_pyfunction!(verification::verify, module)?)?;

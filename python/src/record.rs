@@ -24,6 +24,18 @@ impl Record {
         self.0.to_json()
     }
 
+    /// Return the record with the SHA-256 digests, hexadecimal, of the file of the reference and of that of
+    /// the copy, as the driver adds them to the record of a fingerprint; that of a message has none.
+    #[pyo3(signature = (reference, copy=None))]
+    fn with_file_digests(&self, reference: String, copy: Option<String>) -> Self {
+        let mut recorded = self.0.clone();
+        if let Recorded::Fingerprint(record) = &mut recorded {
+            record.reference.file_sha256 = Some(reference);
+            record.copy.file_sha256 = copy;
+        }
+        Record(recorded)
+    }
+
     /// The recipient; None for a message.
     #[getter]
     fn recipient(&self) -> Option<&str> {

@@ -1,6 +1,7 @@
 //! Verification: layers, records and options → maps and requests → a report.
 
 use crate::{
+    crs::PyCrs,
     errors::{OptionError, VerificationError},
     key::Key,
     layered_maps::LayeredMaps,
@@ -11,9 +12,10 @@ use crate::{
 use meshmark_core::{key::SecretKey, visible};
 use meshmark_detection::{Demodulator, Progress, matching::RadiusChoice, registration::Start};
 use meshmark_verification::{
-    Error, Stages, report,
+    Error, Stages,
     verify::{
         self as verification, LARGEST_SIGNIFICANCE, NamedRecord, ReadRecord, Request, Settings as Chosen,
+        Verification,
     },
 };
 use pyo3::{exceptions::PyUserWarning, prelude::*};
@@ -44,6 +46,7 @@ pub struct Settings<'py> {
     demodulator: String,
     radius: Option<f64>,
     significance: f64,
+    evidence_map: bool,
     exact_displacements: bool,
     show_recipients: bool,
     threads: Option<usize>,
@@ -72,12 +75,13 @@ pub fn verify(
     let warnings = Mutex::new(Vec::new());
     let report = run(py, progress.as_ref(), threads, |job| {
         let mut warn = |text: &str| warnings.lock().expect("nobody panics with it").push(text.to_owned());
-        let mut report = verified(&mut maps, &chosen, marks, job, &mut warn)?;
+        let Verification { mut report, crs } = verified(&mut maps, &chosen, marks, job, &mut warn)?;
         report.warning().iter().for_each(|text| warn(text));
         if !show_recipients {
             report.hide_others();
         }
-        Ok(Report(report.into_file()))
+        let evidence_map = report.evidence_map.take();
+        Ok(Report { report: report.into_file(), evidence_map, crs })
     });
     for text in warnings.into_inner().expect("nobody panics with it") {
         let text = CString::new(visible(&text)).expect("a visible text has no null character");
@@ -92,17 +96,16 @@ fn verified(
     marks: Marks,
     job: &Job,
     warn: &mut dyn FnMut(&str),
-) -> Result<report::Report, VerificationError> {
+) -> Result<Verification<PyCrs>, VerificationError> {
     let listen = |event| match event {
         Progress::Stage { stage, steps } => job.begin(stage, steps as usize),
         Progress::Steps(steps) => job.steps(steps),
     };
     let mut stages = Stages::new(&listen);
-    let found = match marks {
+    Ok(match marks {
         Marks::One(requests) => verification::verify(maps, &requests, &mut stages)?,
         Marks::Any(records) => verification::verify_records(maps, settings, records, &mut stages, warn)?,
-    };
-    Ok(found.report)
+    })
 }
 
 fn marks(settings: &Chosen, sought: &Sought) -> PyResult<Marks> {
@@ -154,7 +157,7 @@ fn chosen(settings: &Settings, key: &SecretKey) -> PyResult<Chosen> {
         radius,
         significance: settings.significance,
         sketch: true,
-        evidence_map: false,
+        evidence_map: settings.evidence_map,
         exact_displacements: settings.exact_displacements,
     })
 }
