@@ -106,14 +106,16 @@ sanitizers: build
 conformance: build
 	host-tests/conformance/run.sh
 
-# A PostGIS of its own, started and stopped, Python, QGIS, a browser that reads reports, the wheel's
-# GDAL and one that is compiled, Debian 13 with its GDAL and QGIS, the examples, the package in a
-# clean Debian; installs what they need. Takes an hour and a half the first time.
-hosts: build plugin-for-wheel
+# A PostGIS of its own, started and stopped, Python, QGIS with and without the driver, a browser that
+# reads reports, the GDAL of pyogrio's wheel and one that is compiled, Debian 13 with its
+# GDAL and QGIS, the examples, the package in a clean Debian; installs what they need. Takes an hour
+# and a half the first time.
+hosts: build plugin-for-wheel wheel
 	host-tests/hosts/postgis.sh
 	host-tests/hosts/python.sh
 	host-tests/hosts/qgis.sh
 	host-tests/hosts/qgis_plugin.sh
+	host-tests/hosts/qgis_without_driver.sh
 	host-tests/hosts/chromium.sh
 	host-tests/hosts/wheel.sh
 	host-tests/hosts/gdal_3_12.sh
@@ -128,7 +130,7 @@ newcomer:
 
 # The zip for QGIS's plugin manager: the same bytes for the same sources.
 qgis:
-	@qgis/make_zip.py qgis/meshmark "$(QGIS_ZIP)"
+	@qgis/make_zip.py qgis/meshmark_qgis "$(QGIS_ZIP)"
 
 fixtures:
 	fixtures/make_fixtures.sh

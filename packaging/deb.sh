@@ -45,8 +45,8 @@ install -m 644 "$root/packaging/copyright" "$documents/copyright"
 install -D -m 644 "$root/plugin/include/meshmark.h" "$tree/usr/include/meshmark.h"
 
 # The plugin where a QGIS of Debian looks; it is enabled in the plugin manager.
-qgis=$tree/usr/share/qgis/python/plugins/meshmark
-install -D -m 644 -t "$qgis" "$root"/qgis/meshmark/{*.py,icon.svg,metadata.txt}
+qgis=$tree/usr/share/qgis/python/plugins/meshmark_qgis
+install -D -m 644 -t "$qgis" "$root"/qgis/meshmark_qgis/{*.py,icon.svg,metadata.txt}
 
 find "$tree" -type d -exec chmod 755 {} +
 find "$documents" -type f -exec chmod 644 {} +
@@ -78,7 +78,7 @@ END
 install -m 755 /dev/stdin "$tree/DEBIAN/prerm" <<END
 #!/bin/sh
 set -e
-rm -rf /usr/share/qgis/python/plugins/meshmark/__pycache__
+rm -rf /usr/share/qgis/python/plugins/meshmark_qgis/__pycache__
 END
 (cd "$tree" && find usr -type f -exec md5sum {} + | sort -k 2) >"$tree/DEBIAN/md5sums"
 

@@ -61,7 +61,7 @@ def context_menu_entry():
 
 def is_in_menu_and_toolbar():
     """Each entry exists once, also after the plugin is loaded again, and works."""
-    assert reloadPlugin("meshmark")
+    assert reloadPlugin("meshmark_qgis")
     entries = ["Export with watermark…", "Verify suspect map…", "Compare original and marked map…", "New key…"]
     submenus = [a.menu() for a in iface.pluginMenu().actions() if a.menu() and a.text().replace("&", "") == "meshmark"]
     assert [[a.text() for a in menu.actions()] for menu in submenus] == [entries], submenus

@@ -7,8 +7,8 @@ from unittest import mock
 sys.path[:0] = ["/usr/share/qgis/python/plugins", sys.argv[1]]
 
 import folder
-from meshmark import keys
-from meshmark.provider import MeshmarkProvider
+from meshmark_qgis import keys
+from meshmark_qgis.provider import MeshmarkProvider
 from processing.core.Processing import Processing
 from processing.gui import AlgorithmDialog as qgis_dialog
 from qgis.core import QgsApplication, QgsProcessingParameterDefinition, QgsProject, QgsSettings, QgsVectorLayer

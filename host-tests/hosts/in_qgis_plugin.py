@@ -11,8 +11,8 @@ from unittest import mock
 sys.path[:0] = ["/usr/share/qgis/python/plugins", sys.argv[1]]
 
 import folder
-from meshmark import commands
-from meshmark.provider import MeshmarkProvider
+from meshmark_qgis import commands
+from meshmark_qgis.provider import MeshmarkProvider
 from osgeo import gdal
 from processing.core.Processing import Processing
 from qgis.core import (

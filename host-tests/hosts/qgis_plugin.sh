@@ -20,7 +20,7 @@ cmp "$work/a.zip" "$work/b.zip" || fail "the zip is not the same twice"
 passed "make qgis makes the same zip twice"
 mkdir -p "$profile/python/plugins"
 unzip -q "$work/a.zip" -d "$profile/python/plugins"
-"$qgis_process" plugins enable meshmark >"$work/log" 2>&1 || fail "the plugin cannot be enabled: $(cat "$work/log")"
+"$qgis_process" plugins enable meshmark_qgis >"$work/log" 2>&1 || fail "the plugin cannot be enabled: $(cat "$work/log")"
 "$qgis_process" list >"$work/log" 2>&1
 for algorithm in export verify compare; do
     grep -q "meshmark:$algorithm" "$work/log" || fail "qgis_process does not list meshmark:$algorithm"

@@ -1,13 +1,11 @@
-"""Verify suspect map: runs `meshmark verify` and adds its evidence as layers."""
+"""Verify suspect map: verifies it and adds the evidence as layers."""
 
-import json
 import math
 import tempfile
 
 from qgis.core import (
     QgsProcessing,
     QgsProcessingContext,
-    QgsProcessingException,
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
     QgsProcessingParameterBoolean,
@@ -16,12 +14,11 @@ from qgis.core import (
     QgsProcessingParameterVectorLayer,
 )
 
-from . import commands, reports, settings, styles
-from .algorithm import Algorithm, Inputs, sentences
+from . import engines, files, reports, settings, styles
+from .algorithm import Algorithm, Inputs
+from .requests import Verification
 from .text import tr
 
-# Exit codes with which the command gives a verdict: match, no match, inconclusive.
-VERDICTS = (0, 1, 3)
 # The parameter that asks for the exact displacements of vertices.
 EXACT = "EXACT_DISPLACEMENTS"
 
@@ -41,7 +38,7 @@ class Verify(Algorithm):
         )
 
     def needs(self):
-        commands.meshmark()
+        engines.verification()
 
     def initAlgorithm(self, configuration=None):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
@@ -102,13 +99,8 @@ class Verify(Algorithm):
         self.addOutput(QgsProcessingOutputNumber("MATCHED_VERTICES", tr("Matched vertices")))
 
     def objection(self, given, context):
-        return None if self._marks(given, context) else tr("Give a record, or a folder of records.")
-
-    def _marks(self, given, context):
-        """Returns the option that names the record, or the folder of records."""
-        record = self.parameterAsString(given, "RECORD", context)
-        folder = self.parameterAsString(given, "RECORDS", context)
-        return ["--record", record] if record else ["--records", folder] if folder else []
+        marks = [self.parameterAsString(given, name, context) for name in ("RECORD", "RECORDS")]
+        return None if any(marks) else tr("Give a record, or a folder of records.")
 
     def prepare(self, given, context, feedback):
         self._reference = self.map_layer(given, "REFERENCE", context)
@@ -121,16 +113,20 @@ class Verify(Algorithm):
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
             inputs = Inputs(self._report.path, staging)
             copies = [inputs.place(self._reference, "reference"), inputs.place(self._suspect, "suspect")]
-            arguments = [commands.meshmark(), "verify", "--json"]
-            arguments += ["--key", self.parameterAsString(given, "KEY", context), *self._marks(given, context)]
-            files = (["--evidence-map", evidence] if evidence else []) + self._report.options()
-            is_exact = bool(files) and self.parameterAsBool(given, EXACT, context)
-            arguments += files + (["--exact-displacements"] if is_exact else [])
-            with commands.all_or_nothing([evidence, self._report.path, *copies]):
-                arguments += ["--reference", inputs.path(self._reference, "reference", context, feedback)]
-                arguments += ["--", inputs.path(self._suspect, "suspect", context, feedback)]
+            is_exact = bool(evidence or self._report.path) and self.parameterAsBool(given, EXACT, context)
+            with files.all_or_nothing([evidence, self._report.path, *copies]):
+                request = Verification(
+                    reference=inputs.path(self._reference, "reference", context, feedback),
+                    suspect=inputs.path(self._suspect, "suspect", context, feedback),
+                    key=self.parameterAsString(given, "KEY", context),
+                    record=self.parameterAsString(given, "RECORD", context),
+                    records=self.parameterAsString(given, "RECORDS", context),
+                    evidence=evidence,
+                    report=self._report.path,
+                    is_exact=is_exact,
+                )
                 feedback.setProgressText(tr("Verifying"))
-                found = answer(commands.run(arguments, feedback), VERDICTS, feedback)
+                found = engines.verification().verify(request, feedback)
         for line in summary(found):
             feedback.pushInfo(line)
         if evidence and context.project():
@@ -156,28 +152,6 @@ class Verify(Algorithm):
     def postProcessAlgorithm(self, context, feedback):
         self._report.open()
         return {}
-
-
-def answer(finished, codes, feedback):
-    """Returns the JSON of the command; raises its error message when it failed."""
-    errors, _ = sentences(finished.errors)
-    if finished.code not in codes:
-        ended = tr("meshmark ended with exit code {}.").format(finished.code)
-        raise QgsProcessingException("\n".join(errors or [ended]))
-    for line in errors:
-        feedback.pushWarning(line)
-    try:
-        found = json.loads(finished.output)
-    except ValueError:
-        found = None
-    if not isinstance(found, dict) or not {"meshmark_report", "meshmark_comparison"} & found.keys():
-        raise QgsProcessingException(
-            tr(
-                "The output of {} is not readable: is it the command meshmark, in this version? See Settings >"
-                " Options > meshmark."
-            ).format(commands.meshmark())
-        )
-    return found
 
 
 def recipients(found):

@@ -1,4 +1,4 @@
-"""The report that the command writes: its parameters, and its display after the run."""
+"""The report of a verification or comparison: its parameters, and its display after the run."""
 
 import os
 
@@ -6,7 +6,7 @@ from qgis.core import QgsProcessingParameterBoolean, QgsProcessingParameterFileD
 from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QDesktopServices
 
-from . import commands
+from . import engines
 from .text import tr
 
 
@@ -29,12 +29,9 @@ class Report:
     def __init__(self, algorithm, given, context, feedback):
         self.path = algorithm.parameterAsFileOutput(given, "REPORT", context)
         self._is_opened = algorithm.parameterAsBool(given, "OPEN_REPORT", context)
-        if self.path and not commands.has_option(algorithm.NAME, "--report"):
+        if self.path and not engines.verification().writes_report(algorithm.NAME):
             feedback.pushWarning(tr("This version of the command meshmark writes no report: install a later one."))
             self.path = ""
-
-    def options(self):
-        return ["--report", self.path] if self.path else []
 
     def open(self):
         """Opens the report, in the main thread, where QGIS has a window."""

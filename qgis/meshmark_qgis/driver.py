@@ -3,20 +3,12 @@
 import contextlib
 import glob
 import os
-from collections import namedtuple
-from xml.etree import ElementTree
 
 from osgeo import gdal
 
-from . import settings
+from . import option_list, settings
+from .missing import Misnamed, Missing
 from .text import tr
-
-# An option of the driver's own list; numbers and choices are texts, as the list has them.
-Option = namedtuple("Option", "name type default least most choices help")
-
-
-class Missing(Exception):
-    """A program or driver is missing; the message explains how to install it."""
 
 
 def find():
@@ -34,7 +26,7 @@ def find():
         return driver
     version = gdal.VersionInfo("RELEASE_NAME")
     searched = tr("it is not in {} either ({})").format(folder, reason or tr("no ogr_MESHMARK there")) if folder else ""
-    raise Missing(
+    raise (Misnamed if folder else Missing)(
         tr(
             "The GDAL driver MESHMARK is not installed for the GDAL {} of this QGIS{}: install meshmark built for"
             " this GDAL (package meshmark, or `make install` in its sources), or name the folder of ogr_MESHMARK.so"
@@ -45,19 +37,7 @@ def find():
 
 def options():
     """Returns the creation options of the driver, in its order."""
-    listed = ElementTree.fromstring(find().GetMetadataItem(gdal.DMD_CREATIONOPTIONLIST))
-    return [
-        Option(
-            entry.get("name"),
-            entry.get("type"),
-            entry.get("default"),
-            entry.get("min"),
-            entry.get("max"),
-            [value.text for value in entry.findall("Value")],
-            entry.get("description"),
-        )
-        for entry in listed.findall("Option")
-    ]
+    return option_list.parsed(find().GetMetadataItem(gdal.DMD_CREATIONOPTIONLIST))
 
 
 def environment():

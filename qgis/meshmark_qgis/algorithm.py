@@ -7,7 +7,7 @@ from qgis.PyQt.QtGui import QIcon
 
 from . import layers
 from .commands import Cancelled
-from .driver import Missing
+from .missing import Missing
 from .text import tr
 
 # The messages that ogr2ogr appends to the reason of the driver.

@@ -1,27 +1,13 @@
-"""New keys, which the command `meshmark keygen` makes."""
+"""New keys."""
 
 import os
 
-from qgis.core import QgsFeedback
+from qgis.core import QgsProcessingException
 from qgis.PyQt.QtWidgets import QFileDialog, QMessageBox
 
-from . import commands, settings
-from .algorithm import sentences
-from .driver import Missing
+from . import engines, settings
+from .missing import Missing
 from .text import tr
-
-
-class Refused(Exception):
-    """The command made no key; the text is its message."""
-
-
-def make(path):
-    """Makes a key in a new file that only its owner can read; raises Refused if it exists."""
-    finished = commands.run([commands.meshmark(), "keygen", "--", path], QgsFeedback())
-    if finished.code != 0:
-        errors, _ = sentences(finished.errors)
-        ended = tr("meshmark ended with exit code {}.").format(finished.code)
-        raise Refused("\n".join(errors or [ended]))
 
 
 def ask_and_make(parent):
@@ -39,8 +25,8 @@ def ask_and_make(parent):
         return None
     path = path if os.path.splitext(path)[1] else f"{path}.json"
     try:
-        make(path)
-    except (Missing, Refused) as reason:
+        engines.verification().make_key(path)
+    except (Missing, QgsProcessingException) as reason:
         QMessageBox.warning(parent, tr("New key"), str(reason))
         return None
     if not settings.get(settings.KEY_FILE):

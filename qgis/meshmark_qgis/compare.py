@@ -1,4 +1,4 @@
-"""Compare original and marked map: runs `meshmark compare` and returns its figures."""
+"""Compare original and marked map: returns the figures of the comparison."""
 
 import tempfile
 
@@ -10,11 +10,10 @@ from qgis.core import (
     QgsProcessingParameterVectorLayer,
 )
 
-from . import commands, reports
+from . import engines, files, reports
 from .algorithm import Algorithm, Inputs
+from .requests import Comparison
 from .text import tr
-from .verify import answer
-
 
 # The ending of the names of figures that the command gives as shares of one.
 PERCENT = "_PERCENT"
@@ -34,7 +33,7 @@ class Compare(Algorithm):
         )
 
     def needs(self):
-        commands.meshmark()
+        engines.verification()
 
     def initAlgorithm(self, configuration=None):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
@@ -72,16 +71,17 @@ class Compare(Algorithm):
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
             inputs = Inputs(self._report.path, staging)
             copies = [inputs.place(self._original, "original"), inputs.place(self._marked, "marked")]
-            arguments = [commands.meshmark(), "compare", "--json", *self._report.options()]
-            names = self.parameterAsString(given, "LAYERS", context)
-            arguments += ["--layers", names] if names else []
-            if given.get("PRECISION") is not None:
-                arguments += ["--precision", repr(self.parameterAsDouble(given, "PRECISION", context))]
-            with commands.all_or_nothing([self._report.path, *copies]):
-                arguments += ["--", inputs.path(self._original, "original", context, feedback)]
-                arguments += [inputs.path(self._marked, "marked", context, feedback)]
+            is_given = given.get("PRECISION") is not None
+            with files.all_or_nothing([self._report.path, *copies]):
+                request = Comparison(
+                    original=inputs.path(self._original, "original", context, feedback),
+                    marked=inputs.path(self._marked, "marked", context, feedback),
+                    layers=self.parameterAsString(given, "LAYERS", context),
+                    precision=self.parameterAsDouble(given, "PRECISION", context) if is_given else None,
+                    report=self._report.path,
+                )
                 feedback.setProgressText(tr("Comparing"))
-                found = answer(commands.run(arguments, feedback), (0,), feedback)
+                found = engines.verification().compare(request, feedback)
         results = {}
         for name, label, (section, figure) in figures():
             share = name.endswith(PERCENT)

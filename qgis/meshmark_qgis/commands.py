@@ -12,7 +12,7 @@ from collections import namedtuple
 from qgis.core import QgsApplication
 
 from . import driver, settings
-from .driver import Missing
+from .missing import Misnamed, Missing
 from .text import tr
 
 Finished = namedtuple("Finished", "code output errors")
@@ -34,7 +34,7 @@ def meshmark():
     """Returns the path of the command meshmark."""
     path = settings.get(settings.COMMAND)
     if path and not shutil.which(path):
-        raise Missing(
+        raise Misnamed(
             tr(
                 "{} is not a program that can be run: correct the path of the command meshmark in Settings >"
                 " Options > meshmark."
@@ -97,25 +97,12 @@ def run(arguments, feedback, on_output=lambda text: None):
 
 
 @contextlib.contextmanager
-def all_or_nothing(paths):
-    """Removes the new files when their writer is cancelled or fails between them."""
-    new = [path for path in paths if path and not os.path.lexists(path)]
-    try:
-        yield
-    except BaseException:
-        for path in new:
-            with contextlib.suppress(FileNotFoundError):
-                os.remove(path)
-        raise
-
-
-@contextlib.contextmanager
 def _startable(program):
     """Reports a program that the system cannot start, such as one for another machine."""
     try:
         yield
     except OSError as error:
-        raise Missing(
+        raise Misnamed(
             tr("{} cannot be started ({}): correct its path in Settings > Options > meshmark, or install it again.").format(
                 program, error.strerror or error
             )

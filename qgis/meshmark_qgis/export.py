@@ -1,7 +1,6 @@
 """Export with watermark: turns layers into a marked file, its record and its reference."""
 
 import os
-import re
 import tempfile
 
 from osgeo import gdal
@@ -18,13 +17,13 @@ from qgis.core import (
     QgsProcessingUtils,
 )
 
-from . import commands, driver, layers, parameters, settings
-from .algorithm import Algorithm, sentences
-from .driver import Missing
+from . import engines, layers, parameters, settings
+from .algorithm import Algorithm
+from .missing import Missing
 from .proof import Proof
 from .text import tr
 
-# Driver options that the algorithm sets itself: paths, and those that follow from the layers and
+# Options that the algorithm sets itself: paths, and those that follow from the layers and
 # the file name.
 OWN = {"KEY", "RECORD", "REFERENCE", "LAYERS", "FORMAT"}
 
@@ -45,8 +44,7 @@ class Export(Algorithm):
         )
 
     def needs(self):
-        driver.find()
-        commands.ogr2ogr()
+        engines.marking()
 
     def initAlgorithm(self, configuration=None):
         vector = QgsProcessing.SourceType.TypeVectorAnyGeometry
@@ -54,7 +52,7 @@ class Export(Algorithm):
             QgsProcessingParameterMultipleLayers("LAYERS", tr("Layers to export"), vector),
             tr("The displayed content is exported: filters and unsaved edits apply. Several layers need a GeoPackage."),
         )
-        self._options = self._driver_options()
+        self._options = self._listed_options()
         options = {option.name: parameters.parameter(option) for option in self._options}
         if "RECIPIENT" in options:
             self.add(
@@ -93,10 +91,10 @@ class Export(Algorithm):
         self.addOutput(QgsProcessingOutputFile("REFERENCE", tr("Reference")))
 
     @staticmethod
-    def _driver_options():
-        """Returns None without the driver; the algorithm then only reports that it is missing."""
+    def _listed_options():
+        """Returns none without driver and package; the algorithm then only reports that they are missing."""
         try:
-            return [option for option in driver.options() if option.name not in OWN]
+            return [option for option in engines.marking().options() if option.name not in OWN]
         except Missing:
             return []
 
@@ -128,7 +126,6 @@ class Export(Algorithm):
         check_is_no_source(output, self._snapshots)
         record, reference = free_names(folder, os.path.splitext(os.path.basename(output))[0])
         values.update(KEY=self.parameterAsString(given, "KEY", context), RECORD=record, REFERENCE=reference)
-        options = [f"{name}={value}" for name, value in values.items() if value]
 
         # Staged files are unmarked, so the folder is private and is removed after the run.
         with tempfile.TemporaryDirectory(prefix="meshmark-") as staging:
@@ -136,8 +133,9 @@ class Export(Algorithm):
             feedback.setProgressText(tr("Copying the layers"))
             names = layers.copy(self._snapshots, source, context, feedback)
             proof = Proof(output, record, reference)
-            export(source, output, options, feedback)
-            proof.check(values["RECIPIENT"], values["MESSAGE"])
+            values = {name: value for name, value in values.items() if value}
+            engines.marking().export(source, output, values, feedback)
+            proof.check(values.get("RECIPIENT"), values.get("MESSAGE"))
         feedback.pushInfo(tr("Record: {}").format(record))
         feedback.pushInfo(tr("Reference: {}").format(reference))
         marked = layers_of(output)
@@ -158,42 +156,6 @@ def is_kept(path, context):
         folders.append(context.temporaryFolder())
     place = os.path.abspath(path)
     return bool(path) and not any(place.startswith(os.path.join(os.path.abspath(folder), "")) for folder in folders)
-
-
-def export(source, output, options, feedback):
-    """Marks a file in a child process, which can be stopped."""
-    feedback.setProgressText(tr("Marking"))
-    arguments = [commands.ogr2ogr(), "-progress", "-f", "MESHMARK", f"MESHMARK:{output}", source]
-    for option in options:
-        arguments += ["-dsco", option]
-    try:
-        finished = commands.run(arguments, feedback, lambda text: feedback.setProgress(percent(text)))
-    except commands.Cancelled:
-        driver.clear_away(output, options)
-        raise
-    errors, warnings = sentences(finished.errors)
-    for warning in warnings:
-        feedback.pushWarning(warning)
-    if finished.code != 0:
-        ended = tr("ogr2ogr ended with exit code {}.").format(finished.code)
-        if "Unable to find driver" in finished.errors:
-            errors.append(tr("Is the folder in Settings > Options > meshmark that of a driver for this GDAL?"))
-        errors = errors or [ended]
-        if os.path.lexists(output):
-            errors.append(tr("{} is the older file, not a copy of this run.").format(output))
-        raise QgsProcessingException("\n".join(errors))
-
-
-# The share of an export in which ogr2ogr hands the features to the driver.
-HANDING_OVER = 0.1
-
-
-def percent(text):
-    """Returns the progress that ogr2ogr prints: "0...10...20", first that of features, then of the marking."""
-    of_features, is_over, of_marking = text.partition("done")
-    numbers = re.findall(r"\d+", of_marking if is_over else of_features)
-    done = float(numbers[-1]) if numbers else 0.0
-    return 100 * HANDING_OVER + (1 - HANDING_OVER) * done if is_over else HANDING_OVER * done
 
 
 def check_places(output, folder, overwrite):
