@@ -216,6 +216,9 @@ def fail_without_a_trace():
     fails("vertices", "new.gpkg", [buildings], PATCH_SIZE=4096)
     fails("wrong.json", "new.gpkg", [buildings], KEY=f"{HERE}/wrong.json")
     fails("none.json: No such file", "new.gpkg", [buildings], KEY=f"{HERE}/none.json")
+    with open("package/key.json", "wb") as copy, open("key.json", "rb") as key:
+        copy.write(key.read())
+    fails("is the key file", "key.json", [buildings], KEY=f"{HERE}/package/key.json", OVERWRITE=True)
     with open("package/map.gpkg-wal", "w", encoding="utf-8") as file:
         file.write("of another program")
     fails("Another program writes to", "map.gpkg", [buildings])

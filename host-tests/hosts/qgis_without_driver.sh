@@ -55,7 +55,7 @@ refused "export without driver and package" "The GDAL driver MESHMARK is not ins
 logged "export without driver and package" "\"${python[0]}\" -m pip install numpy==$numpy meshmark-"
 run verify REFERENCE="$PWD/map.gpkg" SUSPECT="$PWD/map.gpkg" KEY="$PWD/key.json" RECORDS="$PWD/records"
 refused "verify without command and package" "The command meshmark is not installed"
-logged "verify without command and package" "-m pip install meshmark-"
+logged "verify without command and package" "-m pip install numpy==$numpy meshmark-"
 
 export PYTHONPATH=${packages[0]}
 "$qgis_process" help meshmark:export >"$work/with_driver" 2>&1

@@ -84,4 +84,4 @@ def _patches(rows, crs):
 
 
 def _layer(geometries, crs, attributes):
-    return Layer(shapely.to_wkb(geometries).tolist(), crs, attributes)
+    return Layer(shapely.to_wkb(geometries, output_dimension=2).tolist(), crs, attributes)

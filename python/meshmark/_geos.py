@@ -16,7 +16,7 @@ def are_valid(geometries):
 
 def intersections(ones, others):
     """Return the intersection of each pair."""
-    return shapely.to_wkb(shapely.intersection(_read(ones), _read(others))).tolist()
+    return shapely.to_wkb(shapely.intersection(_read(ones), _read(others)), output_dimension=2).tolist()
 
 
 def _read(geometries):

@@ -45,7 +45,11 @@ def opened(path, flags, driver=None):
 def check(path):
     """Raises when GDAL reported a failure on this thread since its errors were reset."""
     if gdal.GetLastErrorType() >= gdal.CE_Failure:
-        raise QgsProcessingException(tr("{}: {}").format(path, gdal.GetLastErrorMsg()))
+        raise QgsProcessingException(
+            tr("{} was not read or written completely ({}): check the file and its folder.").format(
+                path, gdal.GetLastErrorMsg()
+            )
+        )
 
 
 def _layer(package, path, layer, column, feedback):

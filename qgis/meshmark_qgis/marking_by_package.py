@@ -28,6 +28,8 @@ FORMATS = {
     ".geojsonl": Format("GeoJSONSeq", False, 7, True),
     ".geojsons": Format("GeoJSONSeq", False, 7, True),
 }
+# A marked map: key and layers as they were given, the moved layers, the record.
+Marking = namedtuple("Marking", "key layers moved record")
 # Options of the list that the plugin handles itself, and those that shape the mark.
 OWN = ("KEY", "RECORD", "REFERENCE", "OVERWRITE", "ATTRIBUTES")
 OF_MARK = (
@@ -52,45 +54,61 @@ def options():
 
 def export(source, output, values, feedback):
     """Marks a GeoPackage; the values of options are texts."""
-    form = _format_of(output)
-    refuse(values)
-    _check_is_free(output)
+    form, target = _format_of(output), os.path.realpath(output)
+    _check_options(values)
+    _check_target(target, values["KEY"])
     with package.reported(feedback) as meshmark:
-        feedback.setProgressText(tr("Marking with the Python package meshmark {}").format(meshmark.__version__))
-        key = meshmark.Key.read(values["KEY"])
-        layers = maps.read(meshmark, source, feedback)
-        _check_layers(form, layers)
-        options = {name.lower(): value for name, value in values.items() if name in OF_MARK}
-        progress = package.progress(feedback, READ, MARKED)
-        moved, record = meshmark.mark(layers, key, progress=progress, **options)
-        folder, records = os.path.dirname(os.path.abspath(output)), os.path.dirname(os.path.abspath(values["RECORD"]))
+        feedback.pushInfo(tr("Only the GDAL driver searches attributes for unmarked coordinates."))
+        marking = _mark(meshmark, source, (form, values), feedback)
+        folder, records = os.path.dirname(target), os.path.dirname(os.path.abspath(values["RECORD"]))
         with publication.Workplaces(folder, records) as workplaces:
             made = os.path.join(workplaces.of(folder), "out")
             os.mkdir(made)
-            copy = os.path.join(made, os.path.basename(output))
+            copy = os.path.join(made, os.path.basename(target))
             feedback.setProgressText(tr("Writing"))
-            _write(source, moved, copy, form, feedback)
+            _write(source, marking.moved, copy, form, feedback)
             feedback.setProgressText(tr("Reading back"))
-            found = maps.read(meshmark, copy, feedback, form.driver)
-            _check_places(form, moved, found)
-            if form.is_wgs84:
-                _check_mark(meshmark, (found, layers, key, record), feedback)
-            reference = os.path.join(workplaces.of(records), "reference.gpkg")
-            shutil.copyfile(source, reference)
-            record = record.with_file_digests(_digest(reference), _digest_of_only_file(made))
-            written = os.path.join(workplaces.of(records), "record.json")
-            with open(written, "w", encoding="utf-8", newline="") as file:
-                file.write(record.to_json())
-            side = [name for name in sorted(os.listdir(made)) if name != os.path.basename(output)]
-            companions = [(written, values["RECORD"]), (reference, values["REFERENCE"])]
-            companions += [(os.path.join(made, name), os.path.join(folder, name)) for name in side]
+            _check_copy(meshmark, copy, (form, marking), feedback)
+            staged = [os.path.join(workplaces.of(records), name) for name in ("record.json", "reference.gpkg")]
+            shutil.copyfile(source, staged[1])
+            _write_record(marking.record, staged, made)
+            names = [name for name in sorted(os.listdir(made)) if name != os.path.basename(target)]
+            companions = [*zip(staged, (values["RECORD"], values["REFERENCE"]))]
+            companions += [(os.path.join(made, name), os.path.join(folder, name)) for name in names]
             if feedback.isCanceled():
                 raise Cancelled()
             replaces = values.get("OVERWRITE") == "YES"
-            publication.publish(workplaces.of(folder), companions, (copy, os.path.abspath(output)), replaces)
+            publication.publish(workplaces.of(folder), companions, (copy, target), replaces)
 
 
-def refuse(values):
+def _mark(meshmark, source, request, feedback):
+    form, values = request
+    feedback.setProgressText(tr("Marking with the Python package meshmark {}").format(meshmark.__version__))
+    key = meshmark.Key.read(values["KEY"])
+    layers = maps.read(meshmark, source, feedback)
+    _check_layers(form, layers)
+    options = {name.lower(): value for name, value in values.items() if name in OF_MARK}
+    moved, record = meshmark.mark(layers, key, progress=package.progress(feedback, READ, MARKED), **options)
+    return Marking(key, layers, moved, record)
+
+
+def _check_copy(meshmark, copy, meant, feedback):
+    """Raises unless a written file has the places and the mark that were meant."""
+    form, marking = meant
+    found = maps.read(meshmark, copy, feedback, form.driver)
+    _check_places(form, marking.moved, found)
+    if form.is_wgs84:
+        _check_mark(meshmark, found, marking, feedback)
+
+
+def _write_record(record, staged, made):
+    """Writes the record with the digests of the reference and, where it is one file, of the copy in `made`."""
+    path, reference = staged
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        file.write(record.with_file_digests(_digest(reference), _digest_of_only_file(made)).to_json())
+
+
+def _check_options(values):
     """Raises for an option that only the driver has."""
     unknown = sorted(name for name in values if name not in OWN + OF_MARK)
     if values.get("ATTRIBUTES") == "REFUSE":
@@ -134,12 +152,15 @@ def _check_layers(form, layers):
             )
 
 
-def _check_is_free(output):
-    """Raises when another program writes to the file, as its journal would be applied to the new one."""
-    for sidecar in (f"{output}-wal", f"{output}-journal"):
+def _check_target(target, key):
+    """Raises when the file is the key, or another program writes to it, whose journal would be applied to the
+    new file."""
+    if os.path.exists(target) and os.path.exists(key) and os.path.samefile(target, key):
+        raise QgsProcessingException(tr("{} is the key file: choose another file for the map.").format(target))
+    for sidecar in (f"{target}-wal", f"{target}-journal"):
         if os.path.exists(sidecar) and os.path.getsize(sidecar) > 0:
             raise QgsProcessingException(
-                tr("Another program writes to {} ({} exists): close the file there.").format(output, sidecar)
+                tr("Another program writes to {} ({} exists): close the file there.").format(target, sidecar)
             )
 
 
@@ -180,23 +201,22 @@ def _check_places(form, moved, found):
         read_back.check_places(layer, in_file, form.decimals, name)
 
 
-def _check_mark(meshmark, compared, feedback):
+def _check_mark(meshmark, found, marking, feedback):
     """Raises unless the mark can be read from layers that were read back. The package has read it from the moved
     places, so this is for formats that round them."""
-    found, layers, key, record = compared
-    recorded = json.loads(record.to_json())
+    recorded = json.loads(marking.record.to_json())
     if recorded["displacement"]["rms_m"] > MOST_ROUNDED_M:
         return
-    suspect = dict(zip(layers, found.values()))
-    progress = package.progress(feedback, WRITTEN, 100)
-    report = meshmark.verify(suspect, layers, key, record, registration="none", progress=progress)
+    suspect = dict(zip(marking.layers, found.values()))
+    sought = {"record": marking.record, "registration": "none", "progress": package.progress(feedback, WRITTEN, 100)}
+    report = meshmark.verify(suspect, marking.layers, marking.key, **sought)
     message = recorded.get("message")
     if not (report.is_match if message is None else report.message == message):
         raise QgsProcessingException(
             tr(
                 "The mark of {} cannot be read from the written file ({}): choose a format with more digits, or raise"
                 " AMPLITUDE."
-            ).format(record.recipient or message, report.reason)
+            ).format(marking.record.recipient or message, report.reason)
         )
 
 

@@ -19,7 +19,8 @@ def find():
     """Returns the package; raises Missing, with the command that installs it, unless it fits this plugin."""
     importlib.invalidate_caches()
     try:
-        package = importlib.import_module("meshmark")
+        with _own_libraries():
+            package = importlib.import_module("meshmark")
     except ImportError as error:
         # A package that it needs may be the missing one.
         raise Missing(
@@ -38,6 +39,21 @@ def find():
     return package
 
 
+@contextlib.contextmanager
+def _own_libraries():
+    """Lets modules that are imported call the GEOS and PROJ of their wheels; on Linux they would call those of
+    QGIS, which may be older."""
+    if not hasattr(os, "RTLD_DEEPBIND"):
+        yield
+        return
+    flags = sys.getdlopenflags()
+    sys.setdlopenflags(flags | os.RTLD_DEEPBIND)
+    try:
+        yield
+    finally:
+        sys.setdlopenflags(flags)
+
+
 def version():
     """Returns the version of this plugin, which is that of the package that fits."""
     metadata = configparser.ConfigParser(interpolation=None)
@@ -52,17 +68,11 @@ def pip_command():
 
 
 def interpreter():
-    """Returns the path of the Python of this QGIS, whose `sys.executable` may be QGIS itself."""
+    """Returns the path of the Python of this QGIS: `sys.executable` may be QGIS itself, or whichever Python is the
+    first on the path."""
     name = "python.exe" if sys.platform == "win32" else "python3"
-    beside = os.path.dirname(sys.executable or "")
-    places = [
-        os.path.join(sys.exec_prefix, name),
-        os.path.join(sys.exec_prefix, "bin", name),
-        os.path.join(beside, name),
-        os.path.join(beside, "bin", name),
-    ]
-    if os.path.basename(sys.executable or "").lower().startswith("python"):
-        return sys.executable
+    folders = [sys.exec_prefix, os.path.dirname(sys.executable or "")]
+    places = [os.path.join(folder, *below, name) for folder in folders for below in (("bin",), ())]
     return next((place for place in places if os.path.isfile(place)), name)
 
 
@@ -74,7 +84,8 @@ def reported(feedback):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             yield package
-    except package.MeshmarkError as error:
+    except (package.MeshmarkError, RuntimeError) as error:
+        # GDAL raises a RuntimeError where somebody has switched its exceptions on.
         raise QgsProcessingException(str(error)) from error
     except OSError as error:
         raise QgsProcessingException(f"{error.filename}: {error.strerror}" if error.filename else str(error)) from error

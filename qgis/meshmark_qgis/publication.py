@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import tempfile
+import traceback
 
 from qgis.core import QgsProcessingException
 from qgis.PyQt.QtCore import QLockFile
@@ -44,7 +45,10 @@ class Workplaces:
             raise QgsProcessingException(str(error)) from error
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, _kind, _error, trace):
+        # Datasets that the frames of an exception hold are open, and Windows removes no file that is.
+        if trace is not None:
+            traceback.clear_frames(trace)
         self._remove()
 
     def of(self, folder):
