@@ -23,7 +23,7 @@ class Proof:
         if not is_new or not os.path.exists(self._reference) or found.get(expected[0]) != expected[1]:
             raise QgsProcessingException(
                 tr(
-                    "No copy for {} was made although ogr2ogr reported none of its errors: do not hand out {}, and export"
+                    "No copy for {} was made although no error was reported: do not hand out {}, and export"
                     " again to another file."
                 ).format(recipient or message, self._output)
             )
