@@ -107,7 +107,7 @@ conformance: build
 	host-tests/conformance/run.sh
 
 # A PostGIS of its own, started and stopped, Python, QGIS with and without the driver, a browser that
-# reads reports, the GDAL of pyogrio's wheel and one that is compiled, Debian 13 with its
+# reads reports, the GDAL of pyogrio's wheel and one that is compiled, a notebook, Debian 13 with its
 # GDAL and QGIS, the examples, the package in a clean Debian; installs what they need. Takes an hour
 # and a half the first time.
 hosts: build plugin-for-wheel wheel
@@ -118,6 +118,7 @@ hosts: build plugin-for-wheel wheel
 	host-tests/hosts/qgis_without_driver.sh
 	host-tests/hosts/chromium.sh
 	host-tests/hosts/wheel.sh
+	host-tests/hosts/notebook.sh
 	host-tests/hosts/gdal_3_12.sh
 	host-tests/hosts/debian.sh trixie
 	host-tests/hosts/examples.sh
