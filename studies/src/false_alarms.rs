@@ -141,6 +141,7 @@ pub(crate) fn examine(
         parameters,
         layers: None,
         srs: None,
+        recorded_crs: None,
     };
     let suspect = PrivateCopy::make("suspect", suspect)?;
     let mut maps = MapFiles { references: vec![reference.into()], suspect, landmarks: Vec::new() };
