@@ -119,6 +119,7 @@ hosts: build plugin-for-wheel wheel
 	host-tests/hosts/chromium.sh
 	host-tests/hosts/wheel.sh
 	host-tests/hosts/notebook.sh
+	host-tests/hosts/wheels.sh
 	host-tests/hosts/gdal_3_12.sh
 	host-tests/hosts/debian.sh trixie
 	host-tests/hosts/examples.sh

@@ -6,11 +6,7 @@ cd "$(dirname "$0")/.."
 
 python=$1 out=$2
 rm -rf "$out/wheels" "$out/clean"
-"$python" -m venv "$out/tools"
-"$out/tools/bin/python" -m pip install --quiet "maturin[zig]==1.16.0"
-# The linker of zig knows old versions of the C library, so that the wheel runs with them.
-CARGO_TARGET_DIR=$out/build PATH=$PWD/$out/tools/bin:$PATH "$out/tools/bin/maturin" build --quiet --release --locked \
-    --zig --compatibility manylinux2014 --manifest-path python/Cargo.toml --out "$out/wheels"
+python/build_wheel.sh "$python" "$out"
 
 "$python" -m venv "$out/clean"
 "$out/clean/bin/python" -m pip install --quiet "$out"/wheels/*.whl geopandas pyogrio pyarrow
@@ -22,9 +18,6 @@ fi
 root=$PWD
 cd "$out/clean"
 bin/python -m unittest discover -s "$root/python/tests"
-bin/python -c 'import doctest, sys, meshmark
-from meshmark import _comparison, _distribution, _evidence, _layers, _verification
-modules = (meshmark, _comparison, _distribution, _evidence, _layers, _verification)
-sys.exit(any(doctest.testmod(module).failed for module in modules))'
+bin/python "$root/python/run_examples.py"
 cd "$root"
 ls -l "$out"/wheels

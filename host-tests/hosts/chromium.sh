@@ -36,6 +36,14 @@ cp "$root/fixtures/vectors/key.json" key.json # the same pictures every time
 ogr2ogr -f GPKG marked.gpkg MESHMARK:reference.gpkg -oo KEY=key.json -oo RECIPIENT="ACME GmbH" -oo RECORD=acme.json
 ogr2ogr -f GPKG -t_srs EPSG:4326 -spat 385449 6671699 385800 6672000 suspect.gpkg marked.gpkg buildings roads landuse
 "$meshmark" verify --key key.json --reference reference.gpkg --record acme.json suspect.gpkg --report match.html >"$work/out"
+cat >case.toml <<'END'
+number = "2026/117"
+examiner = "A. Example"
+date = 2026-11-28
+custody = ["2026-11-20 received from the police", "2026-11-27 returned"]
+END
+"$meshmark" verify --key key.json --reference reference.gpkg --record acme.json suspect.gpkg --case case.toml --report case.html \
+    >"$work/out"
 "$meshmark" verify --key key.json --reference reference.gpkg --recipient "ACME GmbH" "$fixture" --report inconclusive.html \
     >"$work/out" && fail "another map is not inconclusive"
 "$meshmark" compare reference.gpkg marked.gpkg --report comparison.html >"$work/out"
@@ -45,7 +53,7 @@ echo '<!DOCTYPE html><title>x</title><img src="http://127.0.0.1:9/x"><script>con
 chromium --screenshot="$work/wrong.png" wrong.html
 [ -n "$(console)" ] && [ -n "$(requests)" ] || fail "errors and requests of a page would not be seen"
 
-for page in match inconclusive comparison; do
+for page in match case inconclusive comparison; do
     chromium --screenshot="$work/$page.png" --window-size=900,1600 $page.html
     [ -z "$(console)" ] || fail "$page.html: $(console)"
     [ -z "$(requests)" ] || fail "$page.html requests $(requests)"
@@ -71,8 +79,12 @@ draw phone 390,1850 match.html --
 draw grey 900,1850 match.html -- -colorspace Gray
 draw comparison 900,1850 comparison.html --
 draw inconclusive 900,900 inconclusive.html --
+pdftoppm -r 60 -png -l 2 "$work/case.pdf" "$work/printed"
+convert "$work"/printed-*.png -bordercolor grey -border 1 +append -strip -colors 64 "PNG8:report-print.png"
+[ "$(pdftotext "$work/case.pdf" - | grep -c '2026/117')" -ge "$(pdfinfo "$work/case.pdf" | awk '/^Pages:/ { print $2 }')" ] ||
+    fail "a printed page lacks the number of the case"
 # The dark page is dark, and the grey print is grey.
 brightness() { convert "report-$1.png" -colorspace Gray -format '%[fx:100*mean]' info: | cut -d. -f1; }
 [ "$(brightness desktop)" -gt 70 ] && [ "$(brightness dark)" -lt 40 ] || fail "there is no dark page"
 if [ -d "$pictures" ]; then cp report-*.png "$pictures"; fi
-passed "desktop, dark, phone and grey"
+passed "desktop, dark, phone, grey and print"
