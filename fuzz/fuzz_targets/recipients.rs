@@ -23,7 +23,7 @@ fuzz_target!(|bytes: &[u8]| {
             folder: file::folder().into(),
             format: "GPKG".into(),
         };
-        distribute(&request, &mut Progress::default(), &mut |warning| {
+        distribute(&request, &Progress::default(), &mut |warning| {
             let is_known = [" is there again in line ", "the decomposed form of Unicode"];
             assert!(is_known.iter().any(|words| warning.contains(words)), "{warning}");
             warnings += 1;
