@@ -3,7 +3,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 shopt -s nullglob
-wheels=("${WHEELS:-$root/target/python/wheels}"/*.whl)
+wheels=("${WHEELS:-$root/target/python/wheels}"/*manylinux*"$(uname -m)".whl)
 [ ${#wheels[@]} -eq 1 ] || fail "the wheel is missing: make wheel"
 install_missing python3-venv
 notebook=$root/examples/meshmark.ipynb

@@ -5,7 +5,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 shopt -s nullglob
-wheels=("${WHEELS:-$root/target/python/wheels}"/*.whl)
+wheels=("${WHEELS:-$root/target/python/wheels}"/*manylinux*"$(uname -m)".whl)
 [ ${#wheels[@]} -eq 1 ] || fail "the wheel is missing: make wheel"
 install_missing gdal-bin qgis python3-qgis qgis-providers python3-gdal python3-venv unzip
 # Debian's qgis_process is a wrapper that passes an option its program does not know.
