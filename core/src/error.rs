@@ -1,6 +1,6 @@
 use crate::{
     counted,
-    options::{Code, Kind, OPTIONS, PATCH_SIZE_RANGE, RECIPIENT_BITS, RecipientFault, Spelling},
+    options::{Code, Kind, OPTIONS, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling},
     visible,
 };
 use std::fmt;
@@ -139,6 +139,24 @@ impl fmt::Display for RecordFault {
             RecordFault::NoPart => f.write_str("it names no part of the map"),
             RecordFault::NoRecipient => f.write_str("it has no recipient"),
         }
+    }
+}
+
+/// Why no new mark may have a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecipientFault {
+    /// It has a line break or another control character, which hardly anybody means.
+    Control,
+    /// It begins or ends with white space, which nobody sees.
+    Blanks,
+}
+
+impl fmt::Display for RecipientFault {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            RecipientFault::Control => "has a line break or another control character",
+            RecipientFault::Blanks => "begins or ends with a blank",
+        })
     }
 }
 

@@ -28,7 +28,8 @@ struct ScratchFile {
 impl Columns for ScratchFiles {
     fn column(&self) -> Result<Box<dyn Column>> {
         let usual = || Some(PathBuf::from("/var/tmp")).filter(|folder| folder.is_dir());
-        let folder = env::var_os("TMPDIR").map(PathBuf::from).or_else(usual).unwrap_or_else(env::temp_dir);
+        let given = env::var_os("TMPDIR").filter(|folder| !folder.is_empty());
+        let folder = given.map(PathBuf::from).or_else(usual).unwrap_or_else(env::temp_dir);
         let file = tempfile::tempfile_in(&folder).map_err(|error| failed("made", &folder, &error))?;
         Ok(Box::new(ScratchFile { file, folder, numbers: 0 }))
     }

@@ -122,10 +122,9 @@ impl Error {
                     .into()
             }
             Error::OtherLayers { reference, marked } => format!(
-                "layers without features in the other map under the same name: {} of the reference, and {} of the marked map; \
-                 compare a map with the copy that was marked from it, and give counterparts the same name",
-                names_of(reference),
-                names_of(marked)
+                "the maps have different layers ({}): compare a map with the copy that was marked from it, and give \
+                 counterparts the same name",
+                own_layers(reference, marked)
             ),
             Error::OtherCount { layer, reference, marked } => {
                 let of_layer = layer.as_ref().map_or(String::new(), |layer| format!(" in layer \"{layer}\""));
@@ -147,12 +146,14 @@ impl Error {
     }
 }
 
-/// Returns names in quotes, or that there are none.
-fn names_of(layers: &[String]) -> String {
-    match layers {
-        [] => "none".into(),
-        names => names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", "),
-    }
+/// Returns which layers one map alone has.
+fn own_layers(reference: &[String], marked: &[String]) -> String {
+    let of_map = |(map, layers): (&str, &[String])| {
+        let names: Vec<String> = layers.iter().map(|name| format!("\"{name}\"")).collect();
+        (!names.is_empty()).then(|| format!("only {map} has {}", names.join(", ")))
+    };
+    let each = [("the reference", reference), ("the marked map", marked)].into_iter().filter_map(of_map);
+    each.collect::<Vec<_>>().join(", ")
 }
 
 /// Returns what a message about a reference calls it.

@@ -10,12 +10,13 @@ mod subject;
 mod table;
 mod values;
 
+pub use crate::error::RecipientFault;
 pub use creation::Creation;
 pub use list::{join_list, split_list};
 pub use listing::{creation_option_list_xml, open_option_list_xml, option_table_markdown};
 pub use parameters::{AmplitudeOf, Code, Laplacian, Parameters, Rigidity};
 pub(crate) use parameters::{LDPC_CHANNEL_BITS, LDPC_MESSAGE_BITS};
-pub use recipient::{RecipientFault, check_recipients, composed, recipient_fault};
+pub use recipient::{check_recipients, composed, recipient_fault};
 pub use subject::Subject;
 pub use table::{
     CREATION_OPTIONS, Kind, OPTIONS, OptionSpec, PART_SIZE, PATCH_SIZE_RANGE, RECIPIENT_BITS, Spelling, spec,

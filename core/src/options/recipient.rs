@@ -1,27 +1,9 @@
 //! The names of recipients: which a new mark may have, and which look alike. A copy that was marked
 //! earlier keeps any name.
 
-use crate::{Error, Result};
-use std::{collections::BTreeMap, fmt};
+use crate::{Error, Result, error::RecipientFault};
+use std::collections::BTreeMap;
 use unicode_normalization::UnicodeNormalization;
-
-/// Why no new mark may have a name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RecipientFault {
-    /// It has a line break or another control character, which hardly anybody means.
-    Control,
-    /// It begins or ends with white space, which nobody sees.
-    Blanks,
-}
-
-impl fmt::Display for RecipientFault {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            RecipientFault::Control => "has a line break or another control character",
-            RecipientFault::Blanks => "begins or ends with a blank",
-        })
-    }
-}
 
 /// Returns why no new mark may have a name, if so.
 pub fn recipient_fault(name: &str) -> Option<RecipientFault> {

@@ -16,7 +16,7 @@ pub enum Redrawing {
     /// Vertices at this distance along the curve, from a random place on, in place of the old ones.
     Resample { spacing: f64 },
     /// New vertices with Gaussian errors of this deviation, which are correlated along the curve
-    /// over about [`HAND`]. The ends of a ring need not meet.
+    /// over about `HAND`. The ends of a ring need not meet.
     Trace { spacing: f64, deviation: f64 },
     /// Corners cut at a quarter and three quarters of every edge (Chaikin 1974), this number of
     /// times.

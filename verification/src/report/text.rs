@@ -221,7 +221,7 @@ mod tests {
         let all = [0.1, 2.3, 4.0, 13.7, 13.8, 13.9].map(odds);
         assert_eq!(
             all,
-            ["1.1 to 1", "10.0 to 1", "55 to 1", "890000 to 1", "990000 to 1", "over a million to 1"]
+            ["1.1 to 1", "10.0 to 1", "55 to 1", "890000 to 1", "980000 to 1", "over a million to 1"]
         );
     }
 }
