@@ -20,20 +20,25 @@ const LONGEST_TEXT: u64 = 1 << 26;
 /// This many bytes are reserved for a text: a buffer that grows would leave copies of a secret
 /// behind.
 const USUAL_TEXT: usize = 1024;
+const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// Reads the text of a key file, a record or a plan of sheets.
+/// Reads the text of a key file, a record or a plan of sheets, without the byte order mark that some
+/// editors write.
 ///
 /// # Errors
 /// Fails when `source` fails, on bytes that are not UTF-8, and on more than 64 MiB.
 pub fn read_text(source: impl Read) -> io::Result<Zeroizing<String>> {
     let mut text = Zeroizing::new(String::with_capacity(USUAL_TEXT));
     source.take(LONGEST_TEXT + 1).read_to_string(&mut text)?;
-    match text.len() as u64 {
-        0..=LONGEST_TEXT => Ok(text),
-        _ => Err(io::Error::other(format!(
+    if text.len() as u64 > LONGEST_TEXT {
+        return Err(io::Error::other(format!(
             "it is longer than the {LONGEST_TEXT} bytes of any key, record or plan"
-        ))),
+        )));
     }
+    if text.starts_with(BYTE_ORDER_MARK) {
+        text.remove(0);
+    }
+    Ok(text)
 }
 
 /// Returns whether a passphrase protects a text, which then is in the format of `age`, armoured.
@@ -256,6 +261,7 @@ mod tests {
     fn a_text_is_read_to_its_end_or_refused() {
         let text = "ä".repeat(1 << 19);
         assert_eq!(*read_text(text.as_bytes()).unwrap(), text);
+        assert_eq!(*read_text(format!("\u{feff}{text}").as_bytes()).unwrap(), text);
         for (endless, reason) in [(b' ', "longer than the 67108864 bytes"), (0xff, "UTF-8")] {
             let error = read_text(io::repeat(endless)).unwrap_err().to_string();
             assert!(error.contains(reason), "{error}");

@@ -94,12 +94,20 @@ fn a_recipient_with_a_line_break_or_blanks_around_it_is_refused_and_a_decomposed
         assert!(written.code != Some(0) && written.stderr.contains(words), "{}", written.stderr);
         assert!(!host.path("written.gpkg").exists());
     }
-    for (recipient, is_warned_of) in [("Cafe\u{301}", true), ("Caf\u{e9}", false)] {
-        let (copy, source) = (format!("{is_warned_of}.gpkg"), format!("MESHMARK:{}", map()));
+    for (recipient, warning) in [
+        ("Cafe\u{301}", "decomposed form of Unicode"),
+        ("AC\u{200b}ME", "\"AC\\u{200b}ME\" has characters that nobody sees"),
+        ("Caf\u{e9}", ""),
+    ] {
+        let (copy, source) = (format!("{}.gpkg", warning.len()), format!("MESHMARK:{}", map()));
         let option = format!("RECIPIENT={recipient}");
         let arguments = [&["-f", "GPKG", &copy, &source][..], &KEY, &["-oo", &option]].concat();
         let run = host.run("ogr2ogr", &arguments);
-        assert_eq!(run.succeeds().stderr.contains("decomposed form of Unicode"), is_warned_of);
+        let stderr = &run.succeeds().stderr;
+        assert!(
+            stderr.contains(warning) && stderr.contains("another recipient") != warning.is_empty(),
+            "{stderr}"
+        );
     }
 }
 

@@ -50,13 +50,16 @@ pub fn check_scale(map: &Map, crs: Option<&dyn Crs>) -> Result<()> {
 
 /// Returns the warning about a name of a recipient that looks like another one.
 pub fn spelling_warning(recipient: &str) -> Option<String> {
-    (composed(recipient) != recipient).then(|| {
-        format!(
-            "the recipient \"{}\" is written in the decomposed form of Unicode, with letters and accents as characters of \
-             their own: whoever types the name means another recipient; give it composed (NFC)",
-            visible(recipient)
-        )
-    })
+    let shown = visible(recipient);
+    let how = if shown != recipient {
+        "has characters that nobody sees, of which only the numbers are shown here"
+    } else if composed(recipient) != recipient {
+        "is written in the decomposed form of Unicode, with letters and accents as characters of their own"
+    } else {
+        return None;
+    };
+    let remedy = if shown != recipient { "remove them" } else { "give it composed (NFC)" };
+    Some(format!("the recipient \"{shown}\" {how}: whoever types the name means another recipient; {remedy}"))
 }
 
 /// Up to this share of the vertices may carry no sign without a warning.

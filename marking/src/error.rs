@@ -100,11 +100,17 @@ impl Error {
             Error::UnknownLayer { name, known } => {
                 format!("the map has no layer \"{name}\": {} may name {known}", spelling.name("LAYERS"))
             }
-            Error::MixedCrs { first, first_crs, second, second_crs } => format!(
-                "layers \"{first}\" ({first_crs}) and \"{second}\" ({second_crs}) are not in the same CRS, and a mark \
-                 needs one: choose layers of one CRS with {}, or reproject first",
-                spelling.name("LAYERS")
-            ),
+            Error::MixedCrs { first, first_crs, second, second_crs } => {
+                // In Python the layers are the argument itself.
+                let with = match spelling {
+                    Spelling::Keyword => String::new(),
+                    _ => format!(" with {}", spelling.name("LAYERS")),
+                };
+                format!(
+                    "layers \"{first}\" ({first_crs}) and \"{second}\" ({second_crs}) are not in the same CRS, and a \
+                     mark needs one: choose layers of one CRS{with}, or reproject first"
+                )
+            }
             Error::NoCrs => format!(
                 "the map has no CRS and all its coordinates could be degrees: say which CRS it is, for example {}",
                 spelling.value("SRS", "EPSG:4326")

@@ -24,7 +24,10 @@ def check_options(function, options):
     """Raise for an option that shapes no mark."""
     unknown = sorted(set(options) - set(OPTIONS))
     if unknown:
-        raise TypeError(f"{function}() has no option {unknown[0]}: use {', '.join(OPTIONS)}")
+        raise TypeError(
+            f"{function}() has no option {unknown[0]}: a mark is shaped by {', '.join(OPTIONS)}, and"
+            f" help(meshmark.{function}) lists the other arguments"
+        )
 
 
 def check_kind(name, value, kinds, meant):

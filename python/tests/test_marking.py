@@ -214,7 +214,7 @@ class Refused(Folder):
         frame = town()
         self.refused(meshmark.OptionError, "amplitude=wide is not a number", frame, amplitude="wide")
         self.refused(meshmark.OptionError, "patch_size=3 .*from 16", frame, patch_size=3)
-        self.refused(TypeError, "no option colour: use amplitude", frame, colour="red")
+        self.refused(TypeError, "no option colour: a mark is shaped by amplitude", frame, colour="red")
         self.refused(TypeError, "recipient or a message", frame, message="00")
         self.refused(TypeError, "recipient or a message", frame, recipient=None)
         self.refused(TypeError, "recipient is nan, a float", frame, recipient=float("nan"))

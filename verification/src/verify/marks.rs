@@ -101,8 +101,9 @@ fn check_options(options: &[(&str, &str)], record: &Recorded) -> Result<()> {
         if *name == "PART_SIZE" && alone.parts_of(vertices) == recorded.parts_of(vertices) {
             continue;
         }
-        // Other texts may mean the same CRS (references.rs).
-        if *name == "SRS" && record.crs().is_some() {
+        // Other texts may mean the same CRS, and where the map was marked without one, its file may have
+        // one that it does not state (references.rs).
+        if *name == "SRS" {
             continue;
         }
         let on_record = match (*name, record) {
