@@ -18,6 +18,6 @@ fi
 root=$PWD
 cd "$out/clean"
 bin/python -m unittest discover -s "$root/python/tests"
-bin/python "$root/python/run_examples.py"
+bin/python -I "$root/python/run_examples.py"
 cd "$root"
 ls -l "$out"/wheels

@@ -33,7 +33,7 @@ for suite in $oldest $newest; do
     new_root "$suite" "$work/$suite"
     "${as_root[@]}" cp "$out"/wheels/*manylinux*x86_64.whl "$root/python/run_examples.py" "$work/$suite/root/"
     in_root "$work/$suite" "Debian $suite" "apt-get update -q && apt-get install -y -q --no-install-recommends python3-venv ca-certificates &&
-        python3 -m venv clean && SSL_CERT_FILE=/opt/certs/ca-certificates.crt clean/bin/pip install -q *.whl geopandas &&
+        python3 -m venv clean && PIP_CERT=/opt/certs/ca-certificates.crt clean/bin/pip install -q *.whl geopandas &&
         clean/bin/python run_examples.py"
     passed "Debian $suite: $(tail -n 1 "$work/log")"
 done

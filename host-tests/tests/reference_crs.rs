@@ -75,3 +75,23 @@ fn a_reference_with_another_crs_than_its_record_is_noticed() {
         assert!(text.contains("The reference states EPSG:3067, and its record EPSG:3857"), "{text}");
     }
 }
+
+#[test]
+fn records_of_another_map_in_degrees_do_not_hinder_those_of_this_reference() {
+    let host = marked(&[]);
+    host.run("ogr2ogr", &["-t_srs", "EPSG:4326", "other.gpkg", "source.gpkg", "buildings"]).succeeds();
+    host.mark("GPKG", "other_copy.gpkg", "other.gpkg", &["-oo", "RECORD=other.json"]).succeeds();
+    std::fs::create_dir(host.path("records")).unwrap();
+    for name in ["acme.json", "other.json"] {
+        std::fs::copy(host.path(name), host.path("records").join(name)).unwrap();
+    }
+    let (run, report) = host.verify("map.gpkg", &["--records", "records", "marked.gpkg"]);
+    assert_eq!(
+        (run.code, &report["parameters"]["recipient"]),
+        (Some(0), &"ACME GmbH".into()),
+        "{}",
+        run.stderr
+    );
+    let (run, _) = host.verify("map.gpkg", &["--record", "other.json", "marked.gpkg"]);
+    assert!(run.code == Some(4) && run.stderr.contains("reference"), "{:?} {}", run.code, run.stderr);
+}

@@ -50,7 +50,7 @@ class Comparisons(Folder):
         roads = reference.geometry.boundary.to_frame("geometry")
         for marked in ({"houses": reference, "roads": roads}, {"roads": roads, "houses": reference}):
             self.assertEqual(meshmark.compare({"houses": reference, "roads": roads}, marked).max_m, 0.0)
-        with self.assertRaisesRegex(meshmark.MapError, 'same name: "roads" of the reference, and "streets" of the marked map;'):
+        with self.assertRaisesRegex(meshmark.MapError, 'only the reference has "roads", only the marked map has "streets"'):
             meshmark.compare({"houses": reference, "roads": roads}, {"houses": reference, "streets": roads})
         with self.assertRaisesRegex(meshmark.MapError, '400 geometries in layer "roads" and the marked map 399'):
             meshmark.compare({"houses": reference, "roads": roads}, {"houses": reference, "roads": roads.iloc[1:]})

@@ -25,7 +25,14 @@ pub fn read_reference<M: Maps>(
     {
         return Err(Error::Contradiction { option: "SRS".into(), value: value.into() }.into());
     }
-    maps.reference(reference, request.layers.as_deref(), crs)
+    let layers = request.layers.as_deref();
+    match maps.reference(reference, layers, crs) {
+        // In the CRS of another map's record the numbers may lie nowhere; its digest then refuses the record.
+        Err(_) if crs.recorded.is_some() => {
+            maps.reference(reference, layers, StatedCrs { recorded: None, ..crs })
+        }
+        read => read,
+    }
 }
 
 /// Reads the only reference, or that of several from which the record of the request was made, and
