@@ -141,9 +141,13 @@ class Array:
         return moved.reshape(self.shape)
 
 
+# Geometries have no measures before GEOS 3.12, which writes none then.
+MOST_DIMENSIONS = 4 if shapely.geos_version >= (3, 12, 0) else 3
+
+
 def wkb_of(array):
     """Return geometries as well-known binary, heights and measures included."""
-    return shapely.to_wkb(array, output_dimension=4, byte_order=1, flavor="iso").tolist()
+    return shapely.to_wkb(array, output_dimension=MOST_DIMENSIONS, byte_order=1, flavor="iso").tolist()
 
 
 class Sources:
