@@ -6,7 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 source "$hosts/clean_debian.sh"
 
 most_bytes=8000000
-oldest=bullseye newest=forky # Python 3.9, 3.13 or later
+oldest=bullseye newest=sid # Python 3.9, and what Debian has last
 
 install_missing debootstrap gcc-mingw-w64-x86-64 python3-venv
 out=$root/target/python
