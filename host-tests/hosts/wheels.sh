@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Builds the wheel for Linux on x86-64 and AArch64 and for Windows, and uses it in clean Debians with the
-# oldest Python that it supports and the newest that Debian has. Installs debootstrap and MinGW-w64 where
+# oldest Python that it supports and that of the newest Debian. Installs debootstrap and MinGW-w64 where
 # they are missing, and needs root, or sudo.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 source "$hosts/clean_debian.sh"
 
 most_bytes=8000000
-oldest=bullseye newest=sid # Python 3.9, and what Debian has last
+oldest=bullseye newest=trixie # Python 3.9 and 3.13
 
 install_missing debootstrap gcc-mingw-w64-x86-64 python3-venv
 out=$root/target/python
